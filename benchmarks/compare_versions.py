@@ -1,4 +1,4 @@
-"""CPU seconds of six scenes, this version and another by turns, so that other work on the machine changes neither.
+"""CPU seconds of some scenes, this version and another by turns, so that other work on the machine changes neither.
 
     python benchmarks/compare_versions.py OTHER [--scenes picks hang ...] [--rounds 3] [--device cpu] [--json FILE]
                                           [--caches FOLDER]
@@ -111,8 +111,37 @@ def box_on_towel(device: str) -> tuple[Any, float]:
     return world, 2.0
 
 
+def standing_robots(device: str) -> tuple[Any, float]:
+    """64 worlds of Talos with dynamics, whose arms move, before a table with a towel, 0.25 s."""
+    from imagined_robots import begin, room
+
+    return begin(room(True, True, 20, device), 64, 20), 0.25
+
+
+def kinematic_robot(device: str) -> tuple[Any, float]:
+    """Talos without dynamics, whose arm moves, 60 s frame by frame."""
+    import nuno
+
+    world = nuno.World(device=device)
+    robot = nuno.SimulatedRobot(nuno.Humanoid("talos"), world)
+    robot.angle_vector({f"arm_left_{k}_joint": -0.3 for k in (1, 2, 4)}, 70.0)
+    return _Ticks(world), 60.0
+
+
+class _Ticks:
+    """A world that is stepped frame by frame, as whoever waits for a robot steps it."""
+
+    def __init__(self, world: Any) -> None:
+        self._world = world
+
+    def run(self, seconds: float, progress: bool = False) -> None:
+        for _ in range(round(seconds * 60.0)):
+            self._world.run(1.0 / 60.0, progress=progress)
+
+
 SCENES: dict[str, Callable[[str], tuple[Any, float]]] = {
-    made.__name__: made for made in (picks, picks_by_rule, hang, softcube, boxes, box_on_towel)
+    made.__name__: made
+    for made in (picks, picks_by_rule, hang, softcube, boxes, box_on_towel, standing_robots, kinematic_robot)
 }
 
 

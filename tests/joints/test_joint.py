@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 import nuno
+from nuno.errors import InvalidInputError
 from nuno.joints.held_points import held_points
+from nuno.joints.joint import set_motors
 
 G = 9.81
 DEVICES = ["cpu", pytest.param("cuda:0", marks=pytest.mark.cuda)]
@@ -351,3 +353,46 @@ def test_a_clothes_peg_holds_a_cloth_and_lets_go():
     peg.spring = nuno.Spring(0.5, rest=-0.4)
     world.run(0.5)
     assert towel.vertices[:, 2].mean() < held - 0.2
+
+
+def test_motors_are_set_together_as_each_by_itself():
+    """The drives are the same to the bit, in a batch too; what no motor can have is refused before anything changes."""
+    world = nuno.World(device="cpu")
+    joints = linkage(world, ("hinge", "slider", "hinge"))
+    rng = np.random.default_rng(0)
+    futures = world.imagine(2)
+    for place, worlds in ((world, ()), (futures, (2,))):
+        keys = {grip.key: grip for body in place.bodies for grip in body._dynamics.grips}
+        own = [keys[joint.key] for joint in joints]
+        position, velocity, effort = rng.normal(size=(3, *worlds, 3))
+        stiffness, damping, most = rng.uniform(0.5, 2.0, (3, *worlds, 3))
+        set_motors(own, position, velocity, stiffness, damping, most, effort)
+        together = [joint.spec.drives for joint in own]
+        for k, joint in enumerate(own):
+            values = (part[..., k] for part in (velocity, position, stiffness, damping, most, effort))
+            joint.motor = nuno.Motor(*values)
+            np.testing.assert_array_equal(joint.spec.drives, together[k])
+        before = [joint.spec.drives.copy() for joint in own]
+        good = [position, velocity, stiffness, damping, most, effort]
+        for k, value in ((0, np.nan), (2, 0.0), (3, -1.0), (4, -1.0), (5, np.inf)):
+            bad = [np.where(np.arange(3) == 1, value, part) if n == k else part for n, part in enumerate(good)]
+            with pytest.raises(InvalidInputError):
+                set_motors(own, *bad)
+        np.testing.assert_array_equal([joint.spec.drives for joint in own], before)
+    own[0].release()
+    with pytest.raises(nuno.BodyStateError):
+        set_motors(own, position, velocity, stiffness, damping, most, effort)
+
+
+def test_loads_are_read_together_beside_bodies_without_joints():
+    """Wrenches and efforts of all joints at once are those of each by itself, while a box lies on a cloth elsewhere."""
+    world = nuno.World(device="cpu")
+    joints = linkage(world, ("hinge", "slider"))
+    world.add(nuno.box((0.5, 0.5, 0.02), position=(2.0, 0.0, 0.5)))
+    world.attach(world.add(nuno.sheet((0.2, 0.2), cells=(6, 6), position=(2.0, 0.0, 0.512))), nuno.Cloth(0.2))
+    world.attach(world.add(nuno.box((0.05, 0.05, 0.05), position=(2.0, 0.0, 0.539))), nuno.Rigid(mass=0.1))
+    world.run(3 / 60)
+    wrenches, efforts = world.engine.joint_loads(joints)
+    np.testing.assert_array_equal(wrenches, [[np.concatenate(joint.wrench) for joint in joints]])
+    np.testing.assert_array_equal(efforts, [[joint.effort for joint in joints]])
+    assert wrenches.any()

@@ -16,7 +16,6 @@ from nuno.dynamics.dynamics import Dynamics, State, check_material, rigid_vertic
 from nuno.dynamics.static_place import StaticPlace, same_deformation, what_of
 from nuno.materials import Rigid
 from nuno.rigid.rigid_arrays import PARTS, SAVED
-from nuno.rigid.saved_contacts import LASTING, LISTING
 from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import Pose, compose, invert
 from nuno.solvers.rigid_solver import RigidSolver
@@ -76,6 +75,7 @@ class RigidScene:
         self.static: dict[str, StaticPlace] = {}
         self.kept: dict[str, tuple[int, tuple[int, ...]]] = {}
         self._moving: list[str] = []  # static bodies that had velocities in the last frame
+        self._saved: dict[tuple[str, str], Any] = {}
         self._version = -1
 
     @staticmethod
@@ -143,10 +143,9 @@ class RigidScene:
         return slots
 
     def save(self) -> dict[tuple[str, str], Any]:
-        """Return copies of the arrays of all bodies and contacts, to go back to."""
-        solver = self.solver
-        owners = {"state": SAVED, "manifolds": (*LASTING, *LISTING)}
-        return {(o, name): wp.clone(getattr(getattr(solver, o), name)) for o, names in owners.items() for name in names}
+        """Return copies of the arrays of all bodies and contacts, to go back to until the next call reuses them."""
+        self._saved = self.solver.copies(self._saved)
+        return self._saved
 
     def load(self, saved: dict[tuple[str, str], Any]) -> None:
         """Go back to what `save` returned, in the room that there is now."""

@@ -145,11 +145,13 @@ class BuiltinEngine(Engine):
         wrenches, efforts = np.zeros((worlds, len(joints), 6)), np.zeros((worlds, len(joints)))
         for coupled in self._stepping.last:
             index, borne, along = coupled.joint_loads()
-            for n, joint in enumerate(joints):
-                k = index.get(joint)
-                if k is not None:
-                    kept = coupled.kept[joint.body]
-                    wrenches[kept, n], efforts[kept, n] = borne[kept, k], along[kept, k]
+            pairs = [(n, index[joint]) for n, joint in enumerate(joints) if joint in index]
+            if not pairs:
+                continue
+            own, their = ([*part] for part in zip(*pairs, strict=True))
+            kept = np.array([np.broadcast_to(coupled.kept[joints[n].body], (worlds,)) for n in own]).T
+            wrenches[:, own] = np.where(kept[..., None], borne[:, their], wrenches[:, own])
+            efforts[:, own] = np.where(kept, along[:, their], efforts[:, own])
         return wrenches, efforts
 
     def impulses(self, bodies: Sequence[Body]) -> list[dict[str, np.ndarray]]:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from nuno.errors import BodyStateError
+from nuno.errors import BodyStateError, InvalidInputError
 from nuno.joints.grip import Grip
 from nuno.joints.joint_drives import (
     DRIVES,
@@ -18,6 +18,7 @@ from nuno.joints.joint_drives import (
     friction_drives,
     limit_drives,
     motor_drives,
+    motor_table,
     spring_drives,
 )
 from nuno.joints.joint_motion import positions_of, velocities_of
@@ -199,12 +200,9 @@ class Joint(Grip):
 
     def _set(self, numbers: Callable[[str, Any], dict[str, Any]], value: Any) -> None:
         world = self._live()
-        with world._change("set on a joint"):
-            drives = drive_table(world.world_count, numbers(self.kind, value), self.spec.drives)
-            changed = replace(self.spec, drives=drives)
-            world.engine.allow_grip(changed, self.target is not None and self.target.is_dynamic)
-            self.spec = changed
-            world.engine.drives_changed(self)
+        _change_drives(
+            world, [self], lambda: [drive_table(world.world_count, numbers(self.kind, value), self.spec.drives)]
+        )
 
     def _poses(self) -> tuple[Any, Any]:
         """The joint's frame in the body and in the other, (worlds, 3) and (worlds, 4) each, in the world's frame."""
@@ -220,3 +218,49 @@ class Joint(Grip):
     def _motion(self, body: Body | None, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Velocity [m/s] of a body's point and its angular velocity [rad/s], (worlds, 3) each."""
         return self._live().engine.velocity_at(body, point)
+
+
+def set_motors(
+    joints: Sequence[Joint], positions: np.ndarray, velocities: np.ndarray, stiffness: np.ndarray,
+    damping: np.ndarray, max_effort: np.ndarray, effort: np.ndarray,
+) -> None:  # fmt: skip
+    """Set motors of hinges and sliders of one world at once, as `Joint.motor` sets each; see `Motor`.
+
+    Args:
+        joints: Which.
+        positions: (joints,) or (worlds, joints), as all that follow.
+        velocities: Likewise.
+        stiffness: Above 0.
+        damping: At least 0.
+        max_effort: At least 0, may be endless.
+        effort: Besides what the gains ask for.
+
+    Raises:
+        InvalidInputError: a value that no motor can have.
+        BodyStateError: a joint was released.
+    """
+    if not joints:
+        return
+    worlds = {joint._live() for joint in joints}
+    world = worlds.pop()
+    if worlds:
+        raise InvalidInputError("the joints are in several worlds")
+    motors = motor_table(positions, velocities, stiffness, damping, max_effort, effort)
+
+    def drives() -> np.ndarray:
+        tables = np.stack([joint.spec.drives for joint in joints])  # (joints, worlds, ...)
+        for name, values in motors.items():
+            tables[:, :, DRIVES.index(name)] = np.broadcast_to(values, (world.world_count, len(joints))).T
+        return tables
+
+    _change_drives(world, joints, drives)
+
+
+def _change_drives(world: GripWorld, joints: Sequence[Joint], made: Callable[[], Iterable[np.ndarray]]) -> None:
+    """Give joints the drives (worlds, 11) that ``made`` returns, one a joint."""
+    with world._change("set on a joint"):
+        for joint, drives in zip(joints, made(), strict=True):
+            changed = replace(joint.spec, drives=drives)
+            world.engine.allow_grip(changed, joint.target is not None and joint.target.is_dynamic)
+            joint.spec = changed
+            world.engine.drives_changed(joint)

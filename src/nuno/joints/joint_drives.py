@@ -179,6 +179,32 @@ def motor_drives(kind: str, value: Motor | None) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def motor_table(
+    positions: Any, velocities: Any, stiffness: Any, damping: Any, max_effort: Any, effort: Any
+) -> dict[str, np.ndarray]:
+    """Return the numbers of many motors that go to positions, (joints,) or (worlds, joints) each; see `Motor`.
+
+    Raises:
+        InvalidInputError: a value that no motor can have.
+    """
+    given = {"position": positions, "velocity": velocities, "stiffness": stiffness, "damping": damping}
+    made = {name: _checked_all(name, values) for name, values in {**given, "effort": effort}.items()}
+    most = np.asarray(max_effort, dtype=float)
+    if not (most >= 0.0).all():
+        raise InvalidInputError(f"max_effort must be at least 0, got {most.min():g}")
+    if not (made["stiffness"] > 0.0).all():
+        raise InvalidInputError("a motor that goes to a position needs a stiffness")
+    if (made["damping"] < 0.0).any():
+        raise InvalidInputError(f"damping must be at least 0, got {made['damping'].min():g}")
+    # what the gains make of a wish so much further
+    position = made["position"] + made.pop("effort") / made["stiffness"]
+    return {**made, "position": position, "max_effort": most}
+
+
+def _checked_all(name: str, values: Any) -> np.ndarray:
+    return finite_array(name, values, ("joints",), ("worlds", "joints"))
+
+
 def spring_drives(kind: str, value: Spring | None) -> dict[str, Any]:
     """Return the numbers of a spring, or of none.
 

@@ -1,30 +1,31 @@
-"""Aims: what the whole-body control of a robot is to bring about in a frame."""
+"""Aims: what the whole-body control of robots is to bring about in a frame, as arrays over worlds."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 
 @dataclass(frozen=True, eq=False)
-class FootAim:
-    """The aim of a foot.
+class FootAims:
+    """The aims of the feet.
 
     Attributes:
-        place: Pinocchio's placement of its sole.
-        speed: (6,) [m/s, rad/s], along the world's axes, of a foot in the air.
-        acceleration: (6,) [m/s2, rad/s2], likewise.
-        bears: Whether it stands on the ground and bears.
-        sinks: Whether it goes down until it meets the ground, however far that is.
+        places: (worlds, feet, 3) of the soles [m].
+        turns: (worlds, feet, 3, 3), rotation matrices.
+        speeds: (worlds, feet, 6) [m/s, rad/s], along the world's axes, of feet in the air.
+        accelerations: (worlds, feet, 6) [m/s2, rad/s2], likewise.
+        bears: (worlds, feet) bool, whether they stand on the ground and bear.
+        sinks: (worlds, feet) bool, whether they go down until they meet the ground, however far that is.
     """
 
-    place: Any
-    speed: np.ndarray
-    acceleration: np.ndarray
-    bears: bool
-    sinks: bool = False
+    places: np.ndarray
+    turns: np.ndarray
+    speeds: np.ndarray
+    accelerations: np.ndarray
+    bears: np.ndarray
+    sinks: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,17 +33,18 @@ class Aims:
     """The aims of a frame.
 
     Attributes:
-        centre: (3, 3) place, velocity and acceleration of the centre of mass [m, m/s, m/s2].
-        q: (nq,) posture, and the trunk's orientation.
-        v: (nv,) its velocity.
-        a: (nv,) its acceleration.
+        centres: (worlds, 3, 3) places, velocities and accelerations of the centres of mass [m, m/s, m/s2].
+        q: (worlds, nq) postures, and the trunks' orientation.
+        v: (worlds, nv) their velocities.
+        a: (worlds, nv) their accelerations.
         feet: The feet.
-        falls_freely: Whether the centre of mass has along the ground the acceleration that is given, wherever it is.
+        falls_freely: (worlds,) bool, whether the centre of mass has along the ground the acceleration that is given,
+            wherever it is.
     """
 
-    centre: np.ndarray
+    centres: np.ndarray
     q: np.ndarray
     v: np.ndarray
     a: np.ndarray
-    feet: tuple[FootAim, ...]
-    falls_freely: bool = False
+    feet: FootAims
+    falls_freely: np.ndarray

@@ -1,14 +1,19 @@
-"""Balance: the motors of a robot that follows a motion on its feet, frame by frame, and whether it fell."""
+"""Balance: the motors of a robot that follows a motion on its feet, frame by frame, and whether it fell.
+
+A robot in its own world is the batch of one: the control of all copies goes through a frame as arrays over worlds.
+"""
 
 from __future__ import annotations
 
 import copy
 import logging
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nuno.robot.carried import Carried, carried_by, smoothed
+from nuno.robot.footing import Footing
 from nuno.robot.link_dynamics import LinkDynamics
 from nuno.robot.robot_state import Contacts, RobotState
 from nuno.robot.stabiliser import Stabiliser
@@ -63,79 +68,112 @@ class Balance:
         self._warns = True
         self.is_on = True
 
-    def command(self, now: RobotState, wanted: RobotState, span: float, servo: Servo | None) -> list[np.ndarray]:
-        """Return what the motors are told for a frame: positions, velocities, stiffness, damping and effort (n,) each.
+    def command(
+        self, now: Sequence[RobotState], wanted: Sequence[RobotState], span: float, servo: Servo | None
+    ) -> tuple[np.ndarray, ...]:
+        """Return what motors are told for a frame: positions, velocities, stiffness, damping, effort, (worlds, n) each.
 
         Args:
-            now: How the robot moves.
+            now: How the robot moves, in each world.
             wanted: How it is to move at the end of the frame.
             span: [s] of the frame.
             servo: A torque law that some joints are under, or None.
         """
-        dynamics, robot = self.dynamics, self._robot
-        found = None
-        if self.is_on and self._stabiliser is not None and now.fallen is None:
-            found = self._control.solve(now, self._stabiliser.aims(now, wanted, now.time + span), now.loads)
-        if found is None:
-            gains = dynamics.stiffness, dynamics.damping, np.zeros(len(dynamics.joints))
-            goal = robot.angles_of(wanted.q), wanted.v[6:]
-        else:
-            acceleration, effort = found
-            speed = now.v[6:]
-            goes = speed + 0.5 * span * acceleration[6:]
-            error = robot.angles_of(wanted.q) - robot.angles_of(now.q)
-            gains = (*dynamics.soft, effort + dynamics.overcome(wanted.v[6:] + error / NEARS))
-            goal = robot.angles_of(now.q) + span * speed, goes
-        values = [np.array(part) for part in (*goal, *gains)]
+        dynamics, worlds, stabiliser = self.dynamics, len(now), self._stabiliser
+        angles = self._robot.angles_of(np.array([own.q for own in wanted]))
+        rates = np.array([own.v[6:] for own in wanted])
+        values = [angles, rates, *(np.tile(own, (worlds, 1)) for own in (dynamics.stiffness, dynamics.damping))]
+        values.append(np.zeros(angles.shape))
+        standing = [w for w, own in enumerate(now) if own.fallen is None]
+        if self.is_on and stabiliser is not None and standing:
+            states = [now[w] for w in standing]
+            motion = stabiliser.actual([own.q for own in states], [own.v for own in states])
+            aims = stabiliser.aims(states, [wanted[w] for w in standing], now[0].time + span)
+            found, *solved = self._control.solve(states, motion, aims)
+            who, (accelerations, efforts) = np.array(standing)[found], (own[found] for own in solved)
+            speeds = np.array([own.v[6:] for own in states])[found]
+            present = self._robot.angles_of(np.array([own.q for own in states]))[found]
+            error = angles[who] - present
+            effort = efforts + dynamics.overcome(rates[who] + error / NEARS)
+            goal = present + span * speeds, speeds + 0.5 * span * accelerations[:, 6:]
+            for part, own in zip(values, (*goal, *dynamics.soft, effort), strict=True):
+                part[who] = own
         if servo is not None:
             law: Any = servo.command
             given = (law.q, law.dq, np.maximum(law.kp, 1e-9), law.kd, law.tau)
             for part, own in zip(values, given, strict=True):
-                part[servo.rows] = own
-        return values
+                part[:, servo.rows] = own
+        return tuple(values)
 
     def judge(
-        self, before: RobotState, wanted: RobotState, q: np.ndarray, v: np.ndarray, torques: np.ndarray,
-        contacts: Contacts, wrenches: np.ndarray, loads: np.ndarray | None, time: float,
-    ) -> RobotState:  # fmt: skip
-        """Return the state of a robot that moves so after a frame: whether it fell, and which motors give all.
+        self, before: Sequence[RobotState], wanted: Sequence[RobotState], ended: Sequence[tuple[Any, ...]], time: float
+    ) -> list[RobotState]:  # fmt: skip
+        """Return the states of a robot after a frame, of each world: whether it fell, and which motors give all.
 
         Args:
-            before: Its state when the frame began.
+            before: Its states when the frame began.
             wanted: How it was to move.
-            q: (nq,) where it is.
-            v: (nv,) how it moves.
-            torques: (n,) of its motors [N m; N].
-            contacts: Forces on its links.
-            wrenches: (n, 6) [N, N m], what its joints bore, as ``RobotState.joint_wrenches``.
-            loads: (njoints, 6) [N, N m], what it carries did to the joints, in their own frames; None for nothing.
+            ended: How it moves and what it felt, as the method of that name returns it.
             time: [s].
         """
-        span, fallen = time - before.time, before.fallen
-        a = (v - before.v) / span if span > 0.0 else np.zeros_like(v)
+        q, v, torques, contacts, wrenches, loads = ([*own] for own in zip(*ended, strict=True))
+        fallen, stabiliser = [own.fallen for own in before], self._stabiliser
+        footings: list[Footing | None] = [None] * len(before)
+        standing = [w for w, why in enumerate(fallen) if why is None and stabiliser is not None]
+        if stabiliser is not None and standing:
+            grounds = stabiliser.grounds([wanted[w] for w in standing]).tolist()
+            for w, ground in zip(standing, grounds, strict=True):
+                fallen[w] = self._why_fallen(q[w], wanted[w].q, ground, time)
+            if self.is_on and time - before[0].time > 0.0:
+                standing = [w for w in standing if fallen[w] is None]
+                own = self._footings(before, wanted, q, v, contacts, time, standing)
+                for w, footing in zip(standing, own, strict=True):
+                    footings[w] = footing
         full = np.abs(torques) >= FULL * self.dynamics.efforts
-        over = tuple(name for name, is_full in zip(self._robot.joint_names, full, strict=True) if is_full)
-        footing, stabiliser = None, self._stabiliser
-        if fallen is None and stabiliser is not None:
-            up = 1.0 - 2.0 * (q[3] ** 2 + q[4] ** 2)
-            ground = stabiliser.ground(wanted.q)
-            why = ""
-            if up < LEANS:
-                why = f"its trunk leans by {np.rad2deg(np.arccos(np.clip(up, -1.0, 1.0))):.0f} degrees"
-            elif q[2] - ground < SINKS * (wanted.q[2] - ground):
-                why = f"its base is {q[2] - ground:.2f} m above its feet's ground"
-            if why:
-                fallen = f"{why} at t = {time:.2f} s"
-                if self._warns:
-                    logger.warning("%r fell: %s; robot.set_up() stands it up again", self._robot.name, fallen)
-        if fallen is None and stabiliser is not None and self.is_on and span > 0.0:
-            pressed = np.array([sum(f[2] for f in contacts.get(link, {}).values()) for link in self._foot_links])
-            load = self.load(before)
-            footing = stabiliser.footing(before, wanted, q, v, pressed, time, load)
-        return RobotState(
-            time, q, v, a, torques, fallen, over, loads=smoothed(before.loads, loads, span), contacts=contacts,
-            joint_wrenches=wrenches, footing=footing,
-        )  # fmt: skip
+        over: list[tuple[str, ...]] = [()] * len(before)
+        for w in np.flatnonzero(full.any(axis=1)).tolist():
+            over[w] = tuple(name for name, is_full in zip(self._robot.joint_names, full[w], strict=True) if is_full)
+        found = []
+        for w, earlier in enumerate(before):
+            span = time - earlier.time
+            a = (v[w] - earlier.v) / span if span > 0.0 else np.zeros_like(v[w])
+            found.append(RobotState(
+                time, q[w], v[w], a, torques[w], fallen[w], over[w], loads=smoothed(earlier.loads, loads[w], span),
+                contacts=contacts[w], joint_wrenches=wrenches[w], footing=footings[w],
+            ))  # fmt: skip
+        return found
+
+    def _why_fallen(self, q: np.ndarray, wanted: np.ndarray, ground: float, time: float) -> str | None:
+        """Return why and when a robot that is at q (nq,) on a ground [m] fell, None where it did not; say it once."""
+        up, why = 1.0 - 2.0 * (q[3] ** 2 + q[4] ** 2), ""
+        if up < LEANS:
+            why = f"its trunk leans by {np.rad2deg(np.arccos(np.clip(up, -1.0, 1.0))):.0f} degrees"
+        elif q[2] - ground < SINKS * (wanted[2] - ground):
+            why = f"its base is {q[2] - ground:.2f} m above its feet's ground"
+        if not why:
+            return None
+        fallen = f"{why} at t = {time:.2f} s"
+        if self._warns:
+            logger.warning("%r fell: %s; robot.set_up() stands it up again", self._robot.name, fallen)
+        return fallen
+
+    def _footings(
+        self, before: Sequence[RobotState], wanted: Sequence[RobotState], q: Sequence[np.ndarray],
+        v: Sequence[np.ndarray], contacts: Sequence[Contacts], time: float, standing: list[int],
+    ) -> list[Footing]:  # fmt: skip
+        """Return the footings after a frame in worlds in which a robot stands."""
+        stabiliser: Any = self._stabiliser
+        if not standing:
+            return []
+        pressed = np.array([
+            [sum(force[2] for force in contacts[w].get(link, {}).values()) for link in self._foot_links]
+            for w in standing
+        ], dtype=float)  # fmt: skip
+        states = [before[w] for w in standing]
+        aims, places, speeds = ([part[w] for w in standing] for part in (wanted, q, v))
+        loads = [self.load(own) for own in states]
+        footings: list[Footing] = stabiliser.footings(states, aims, places, speeds, pressed, time, loads)
+        return footings
 
     def load(self, state: RobotState) -> Carried | None:
         """Return what a robot carries."""
@@ -143,7 +181,12 @@ class Balance:
         return carried_by(self._robot, self._data, state.q, state.loads, gravity)
 
     def ended(self, span: float) -> list[tuple[Any, Any, Any, Any, Any, Any]]:
-        """Return q, v, torques, contacts, joint wrenches and loads after a frame of ``span`` [s], of each world."""
+        """Return q, v, torques, contacts, joint wrenches and loads after a frame of ``span`` [s], of each world.
+
+        These are (nq,); (nv,); (n,) [N m; N] of the motors; forces on the links; (n, 6) [N, N m], what the joints bore,
+        as ``RobotState.joint_wrenches``; and (njoints, 6) [N, N m], what the robot carries did to the joints, in their
+        own frames, None for nothing.
+        """
         dynamics = self.dynamics
         q, v = dynamics.read()
         contacts, wrenches, efforts = dynamics.felt(span)
@@ -154,4 +197,6 @@ class Balance:
         """Return the same for the copies of the links in a batch that was imagined from their world."""
         made = copy.copy(self)
         made.dynamics, made._warns = self.dynamics.imagined(world), False
+        made._data, made._control = self._robot.model.createData(), self._control.imagined()
+        made._stabiliser = None if self._stabiliser is None else self._stabiliser.imagined()
         return made

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nuno.joints.joint_drives import Motor
+from nuno.joints.joint import set_motors
 from nuno.materials import Rigid
 from nuno.shapes import quaternion as quat
 from nuno.world.make_joints import slider
@@ -122,17 +122,17 @@ class FingerDynamics:
         """
         if not self.joints:
             return {}
-        slides = self.slides()
-        for k, (finger, joint) in enumerate(zip(self.fingers, self.joints, strict=True)):
-            force = self.forces[finger.hand]
-            stiffness = force / AHEAD
+        slides, forces = self.slides(), np.array([self.forces[finger.hand] for finger in self.fingers])
+        goals = np.empty(slides.shape)
+        for k, finger in enumerate(self.fingers):
             goal = finger.slide(wanted)
             presses = goal >= finger.far
             if self.closed[finger.hand]:
                 presses |= goal > slides[:, k] - OPENS
-            goal = np.where(presses, finger.far + AHEAD, goal)
-            goal = np.clip(goal, slides[:, k] - AHEAD, slides[:, k] + AHEAD)
-            joint.motor = Motor(0.0, goal, stiffness, DAMPED * stiffness, force)
+            goals[:, k] = np.where(presses, finger.far + AHEAD, goal)
+        stiffness, still = forces / AHEAD, np.zeros(len(forces))
+        goals = np.clip(goals, slides - AHEAD, slides + AHEAD)
+        set_motors(self.joints, goals, still, stiffness, DAMPED * stiffness, forces, still)
         return {finger.row: finger.angle(slides[:, k]) for k, finger in enumerate(self.fingers)}
 
     def imagined(self, world: World, bodies: Sequence[Body], joints: Mapping[str, Any]) -> FingerDynamics:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -30,19 +30,23 @@ ADOPTS = 0.2
 
 @dataclass(frozen=True, eq=False)
 class Soles:
-    """Soles of a robot, as they are and as they are wanted.
+    """Soles of robots, as they are and as they are wanted, in each of some worlds.
 
     Attributes:
-        places: Where they are.
-        wanted: Where they are wanted.
-        sinking: (feet,) [m/s], vertical velocities that are wanted.
-        pressed: (feet,) [N], with what they press on the ground; None where that is not known yet.
+        places: (worlds, feet, 3) [m], where they are.
+        turns: (worlds, feet, 3, 3), rotation matrices.
+        wanted_places: (worlds, feet, 3) [m], where they are wanted.
+        wanted_turns: (worlds, feet, 3, 3), likewise.
+        sinking: (worlds, feet) [m/s], vertical velocities that are wanted.
+        pressed: (worlds, feet) [N], with what they press on the ground.
     """
 
-    places: Sequence[Any]
-    wanted: Sequence[Any]
+    places: np.ndarray
+    turns: np.ndarray
+    wanted_places: np.ndarray
+    wanted_turns: np.ndarray
     sinking: np.ndarray
-    pressed: np.ndarray | None
+    pressed: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,44 +73,45 @@ class Footing:
     frames: int = 0
 
 
-def found_footing(before: Footing | None, soles: Soles, weight: float, span: float, lean: Any = 0.0) -> Footing:
-    """Return the footing at the end of a frame, without a step.
+def are_planned(heights: np.ndarray) -> np.ndarray:
+    """Return which feet are to stand, (worlds, feet) bool, by the heights of wanted soles (worlds, feet) [m]."""
+    return np.asarray(heights < heights.min(axis=1, keepdims=True) + STANDS)
+
+
+def planned_footings(heights: np.ndarray) -> list[Footing]:
+    """Return the footings of robots of which nothing is known, by the heights of wanted soles (worlds, feet) [m]."""
+    nothing = np.zeros((heights.shape[1], 3))
+    return [Footing(tuple(own), nothing, nothing, np.zeros(3)) for own in are_planned(heights).tolist()]
+
+
+def found_footings(
+    before: Sequence[Footing], soles: Soles, weight: float, spans: np.ndarray, leans: np.ndarray
+) -> list[Footing]:
+    """Return the footings at the end of a frame, without steps, of each world.
 
     Args:
-        before: That at its beginning; None where nothing is known.
+        before: Those at its beginning.
         soles: The soles.
         weight: Of the robot [N].
-        span: Of the frame [s].
-        lean: (3,) [m], by which the centre of mass is to go besides, where the robot carries something.
+        spans: (worlds,) of the frame [s].
+        leans: (worlds, 3) [m], by which the centre of mass is to go besides, where the robot carries something.
     """
-    count = len(soles.places)
-    lowest = min(own.translation[2] for own in soles.wanted)
-    planned = [bool(own.translation[2] < lowest + STANDS) for own in soles.wanted]
-    if before is None:
-        nothing = np.zeros((count, 3))
-        return Footing(tuple(planned), nothing, nothing, np.zeros(3))
-    pressed = np.full(count, np.inf) if soles.pressed is None else soles.pressed
-    heights = [there.translation[2] - own.translation[2] for there, own in zip(soles.places, soles.wanted, strict=True)]
-    presses = [
-        bool(force > FIRM * weight and (plan or speed < GOES_DOWN))
-        for force, plan, speed in zip(pressed, planned, soles.sinking, strict=True)
-    ]
+    planned = are_planned(soles.wanted_places[:, :, 2])
+    stood, all_offsets = np.array([own.bears for own in before]), np.array([own.offsets for own in before])
+    all_tilts, centres = np.array([own.tilts for own in before]), np.array([own.centre for own in before])
+    away = soles.places - soles.wanted_places
+    presses = (soles.pressed > FIRM * weight) & (planned | (soles.sinking < GOES_DOWN))
     # one that bears nothing, as the weight is on the other, still stands where it is
-    bears = tuple(
-        own or (was and plan and abs(height - offset) < RESTS)
-        for own, was, plan, height, offset in zip(
-            presses, before.bears, planned, heights, before.offsets[:, 2], strict=True
-        )
-    )
-    adopts = 1.0 - math.exp(-span / ADOPTS)
-    kept = np.where(bears, 1.0, math.exp(-span / FORGETS))[:, None]
-    offsets, tilts = before.offsets * kept, before.tilts * kept
-    for k, bearing in enumerate(presses):
-        if bearing:
-            offsets[k] = soles.places[k].translation - soles.wanted[k].translation
-            tilt = pin.log3(soles.places[k].rotation @ soles.wanted[k].rotation.T)
-            tilts[k] = before.tilts[k] + adopts * (np.array([tilt[0], tilt[1], 0.0]) - before.tilts[k])
-    centre = before.centre
-    if any(bears):
-        centre = centre + adopts * (offsets[list(bears)].mean(axis=0) + lean - centre)
-    return Footing(bears, offsets, tilts, centre)
+    bears = presses | (stood & planned & (np.abs(away[:, :, 2] - all_offsets[:, :, 2]) < RESTS))
+    adopts = np.array([1.0 - math.exp(-span / ADOPTS) for span in spans.tolist()])[:, None]
+    forgets = np.array([math.exp(-span / FORGETS) for span in spans.tolist()])[:, None]
+    kept = np.where(bears, 1.0, forgets)[:, :, None]
+    offsets, tilts = np.where(presses[:, :, None], away, all_offsets * kept), all_tilts * kept
+    found, tilted = soles.turns @ soles.wanted_turns.swapaxes(-1, -2), np.zeros_like(tilts)
+    for w, k in np.argwhere(presses).tolist():
+        tilted[w, k, :2] = pin.log3(found[w, k])[:2]
+    tilts = np.where(presses[:, :, None], all_tilts + adopts[:, None] * (tilted - all_tilts), tilts)
+    count = bears.sum(axis=1)[:, None]
+    middle = np.where(bears[:, :, None], offsets, 0.0).sum(axis=1) / np.maximum(count, 1)
+    centres = np.where(count > 0, centres + adopts * (middle + leans - centres), centres)
+    return [Footing(tuple(own), *rest) for own, *rest in zip(bears.tolist(), offsets, tilts, centres, strict=True)]

@@ -205,10 +205,10 @@ class ImaginedRobot:
         if not self._is_whole():
             return
         span, self._before = end - start, list(self._states)
-        servo = None if self.balance is not None or self._servo is None else self._serve
         if self.balance is None:
             found = self._together.begin_ahead(start, end)
             if found is None:
+                servo = None if self._servo is None else self._serve
                 aims, angles = self._together.begin(end, span, servo)
                 found = aims, np.array([end]), np.array([[aim.q for aim in aims]]), angles[None]
             aims, *frames = found
@@ -217,14 +217,10 @@ class ImaginedRobot:
                     self._batch.lead(start, *frames)
                 self._states = list(aims)
             return
-        aims = [own.begin(end, span, servo) for own in self._motions]
+        aims, _ = self._together.begin(end, span, states=self._states)
         if span > 0.0:
-            commands = [
-                self.balance.command(state, aim, span, self._servo)
-                for state, aim in zip(self._states, aims, strict=True)
-            ]
-            self.balance.dynamics.drive(*(np.array(part) for part in zip(*commands, strict=True)))
-            self.balance.dynamics.lead_fingers(np.array([self.original.actual.angles_of(aim.q) for aim in aims]))
+            self.balance.dynamics.drive(*self.balance.command(self._states, aims, span, self._servo))
+            self.balance.dynamics.lead_fingers(self.original.actual.angles_of(np.array([aim.q for aim in aims])))
 
     def end_frame(self) -> None:
         """Take the frame's motion as done."""
@@ -238,23 +234,13 @@ class ImaginedRobot:
             ]
             return
         ended = self.balance.ended(max(self.world.time - self._before[0].time, 1e-9))
-        self._states = [
-            self.balance.judge(before, own.aim, *found, self.world.time)
-            for before, own, found in zip(self._states, self._motions, ended, strict=True)
-        ]
-        for own, state in zip(self._motions, self._states, strict=True):
-            own.take_footing(state)
-            own.joints.take_step((self.original.actual.angles_of(state.q), state.v[6:], state.a[6:]))
-            own.gait.end_frame()
+        self._states = self.balance.judge(self._states, self._together.aims, ended, self.world.time)
+        self._together.end(self._states)
 
     def cancel_frame(self) -> None:
         """Go back to where the robot was when the frame began."""
         self._states = list(self._before)
-        if self.balance is None:
-            self._together.cancel()
-            return
-        for own in self._motions:
-            own.cancel()
+        self._together.cancel()
 
     def save(self) -> Any:
         """Return all that it is, for a snapshot."""

@@ -11,8 +11,8 @@ import numpy as np
 from nuno.dynamics.dynamics import dynamics_of
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.joints.held_points import held_points
-from nuno.joints.joint import Joint
-from nuno.joints.joint_drives import Motor, Spring
+from nuno.joints.joint import Joint, set_motors
+from nuno.joints.joint_drives import Spring
 from nuno.joints.joint_motion import positions_of, velocities_of
 from nuno.materials import Rigid
 from nuno.robot.finger_dynamics import FingerDynamics, possible_inertia
@@ -84,6 +84,7 @@ class LinkDynamics:
         self.joint_friction = np.array(model.upperDryFrictionLimit[6:])
         self.joint_damping = np.array(model.damping[6:])
         self._is_free = bool(self.robot.description.feet)
+        self._frames: tuple[Any, Any] | None = None  # joints, and what `_joint_frames` found of them
         self.fingers = FingerDynamics(links, self.efforts)
 
     @property
@@ -156,10 +157,7 @@ class LinkDynamics:
     ) -> None:  # fmt: skip
         """Set all motors: (n,) each, or (worlds, n)."""
         most = self.efforts + self.joint_friction
-        for n, joint in enumerate(self.joints):
-            joint.motor = Motor(
-                velocities[..., n], positions[..., n], stiffness[..., n], damping[..., n], most[n], effort[..., n]
-            )
+        set_motors(self.joints, positions, velocities, stiffness, damping, most, effort)
 
     def overcome(self, velocities: np.ndarray) -> np.ndarray:
         """Return what friction and damping take of joints that go at velocities [rad/s; m/s], of (n,) each."""
@@ -170,9 +168,12 @@ class LinkDynamics:
 
         The joints of their hands go where the fingers are.
         """
-        for row, angle in self.fingers.lead(wanted).items():
-            most = self.efforts[row] + self.joint_friction[row]
-            self.joints[row].motor = Motor(0.0, angle, self.stiffness[row], self.damping[row], most)
+        there = self.fingers.lead(wanted)
+        if there:
+            rows, angles = [*there], np.stack([*there.values()], axis=-1)
+            joints, still = [self.joints[row] for row in rows], np.zeros(len(rows))
+            most = (self.efforts + self.joint_friction)[rows]
+            set_motors(joints, angles, still, self.stiffness[rows], self.damping[rows], most, still)
 
     def read(self) -> tuple[np.ndarray, np.ndarray]:
         """Return where the robot is, q (worlds, nq), and how it moves, v (worlds, nv), as Pinocchio has them."""
@@ -192,30 +193,34 @@ class LinkDynamics:
         v[:, :3], v[:, 3:6] = quat.rotate(back, velocities[:, 0]), quat.rotate(back, spins[:, 0])
         v[:, 6:] = rates
         pose = np.concatenate([places[:, 0], np.roll(turns[:, 0], -1, axis=1)], axis=1)
-        return np.stack([robot.configuration_of(a, own) for a, own in zip(angles, pose, strict=True)]), v
+        return robot.configuration_of(angles, pose), v
 
     def _along(
         self, places: np.ndarray, turns: np.ndarray, velocities: np.ndarray, spins: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return positions and velocities of the joints, (worlds, n) each, as they tell them themselves."""
-        model = self.robot.model
-        own = np.arange(1, len(self.joints) + 1)
-        other = np.array([int(model.parents[j]) - 1 for j in range(2, model.njoints)], dtype=int)
-        specs = [joint.spec for joint in self.joints]
-        place, turn, other_place, other_turn = (
-            np.stack([getattr(spec, name) for spec in specs], axis=1)
-            for name in ("place", "turn", "other_place", "other_turn")
-        )
+        own, other, slides, (place, turn, other_place, other_turn) = self._joint_frames()
         frame = (places[:, own] + quat.rotate(turns[:, own], place), quat.multiply(turns[:, own], turn))
         its = (
             places[:, other] + quat.rotate(turns[:, other], other_place), quat.multiply(turns[:, other], other_turn)
         )  # fmt: skip
-        slides, spin = np.array([spec.kind == "slider" for spec in specs]), spins[:, own] - spins[:, other]
+        spin = spins[:, own] - spins[:, other]
         speed = (
             velocities[:, own] + np.cross(spins[:, own], frame[0] - places[:, own])
             - velocities[:, other] - np.cross(spins[:, other], frame[0] - places[:, other])
         )  # fmt: skip
         return positions_of(slides, frame, its), velocities_of(slides, speed, spin, its)
+
+    def _joint_frames(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[np.ndarray]]:
+        """Return each joint's bodies, whether it slides, and its frames in both, which stay as long as it is there."""
+        if self._frames is None or self._frames[0] is not self.joints:
+            parents = [int(self.robot.model.parents[j]) - 1 for j in range(2, self.robot.model.njoints)]
+            specs = [joint.spec for joint in self.joints]
+            names = ("place", "turn", "other_place", "other_turn")
+            frames = [np.stack([getattr(spec, name) for spec in specs], axis=1) for name in names]
+            slides = np.array([spec.kind == "slider" for spec in specs])
+            self._frames = self.joints, (np.arange(1, len(specs) + 1), np.array(parents, dtype=int), slides, frames)
+        return self._frames[1]
 
     def felt(self, span: float) -> tuple[list[Contacts], np.ndarray, np.ndarray]:
         """Return what touched links, what joints bore, and what their motors did over the last frame.
@@ -233,9 +238,9 @@ class LinkDynamics:
         found: list[dict[str, dict[str, np.ndarray]]] = [{} for _ in range(self.world.world_count)]
         for name, own in zip(self.links.names, engine.impulses(self.bodies), strict=True):
             for other, impulse in own.items():
-                for contacts, given in zip(found, impulse, strict=True):
-                    if given.any():
-                        contacts.setdefault(name, {})[other] = given / span
+                force = impulse / span
+                for w in np.flatnonzero(impulse.any(axis=1)).tolist():
+                    found[w].setdefault(name, {})[other] = force[w]
         return list(found), wrenches, efforts
 
     def pressing(self, contacts: Contacts, feet: Sequence[str]) -> dict[str, np.ndarray]:

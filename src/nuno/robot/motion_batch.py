@@ -11,6 +11,7 @@ import numpy as np
 
 from nuno.robot.joint_batch import JointBatch
 from nuno.robot.robot_state import RobotState
+from nuno.robot.trajectory import Motion
 
 if TYPE_CHECKING:
     from nuno.robot.humanoid import Humanoid
@@ -42,22 +43,26 @@ class FramesAhead:
 
 
 class MotionBatch:
-    """The wanted motions of copies of a robot without dynamics.
+    """The wanted motions of copies of a robot.
 
     Joints of copies in which only polynomials are followed go as arrays. A copy is asked itself, as if it were alone,
-    where a controller takes up something else, a goal may end, a leg moves, the robot walks, or its guard is to look.
-    What comes of it is the same to the bit.
+    where a controller takes up something else, a goal may end, a leg moves, the robot walks, makes a step to catch
+    itself, or its guard is to look. What comes of it is the same to the bit.
 
     Args:
         robot: The robot.
         motions: Of the copies, which are brought up to date where they are asked, and by ``bring``.
-        guards: Of the copies.
+        guards: Of the copies; none where they have dynamics.
+
+    Attributes:
+        aims: How the copies are to move, as ``begin`` returned it last.
     """
 
     def __init__(self, robot: Humanoid, motions: Sequence[WantedMotion], guards: Sequence[MotionGuard]) -> None:
         self._robot, self._motions, self._guards = robot, motions, guards
         self._joints: JointBatch | None = None  # which has what the joints are, while nobody asks the copies
         self._aims: list[RobotState] = []
+        self.aims: list[RobotState] = []
         self._asked: list[int] = []
         self._pending: tuple[Any, ...] = ()  # aims, and what `JointBatch.take` is told of them
         self._worked_out: tuple[Any, ...] = ()  # aims, and what joints are after frames that were worked out ahead
@@ -81,7 +86,7 @@ class MotionBatch:
         for before, end in pairwise((start, *ends)):
             span = end - before
             motion, desired, rests = joints.step(span)
-            due = self._are_due(span, motion) | (joints.clock + span > quiet)
+            due = self._are_due(span) | self._legs_move(motion) | (joints.clock + span > quiet)
             if due.any():
                 break
             moves, before_it = ~rests, configurations
@@ -116,24 +121,37 @@ class MotionBatch:
         angles = np.stack([motion[0] for _, motion, _ in ahead.joints[:count]])
         return aims, np.array(ahead.ends[:count]), configurations, angles
 
-    def begin(self, end: float, span: float, servo: Servo | None) -> tuple[list[RobotState], np.ndarray]:
+    def begin(
+        self, end: float, span: float, servo: Servo | None = None, states: Sequence[RobotState] = ()
+    ) -> tuple[list[RobotState], np.ndarray]:
         """Return how the copies are to move at a time ``end`` [s], ``span`` [s] from now, and their joints (n, m).
 
         ``end`` of this class takes that, ``cancel`` does not.
+
+        Args:
+            end: [s].
+            span: [s].
+            servo: What moves some joints, or None.
+            states: How copies with dynamics move now.
         """
         self._asked, self._pending, self._worked_out = list(range(len(self._motions))), (), ()
         if span <= 0.0:
             self.bring()
-            return [own.begin(end, span) for own in self._motions], self._angles()
+            self.aims = [own.begin(end, span) for own in self._motions]
+            return self.aims, self._angles()
         joints = self._prepared()
         motion, desired, rests = joints.step(span)
-        alone = self._are_due(span, motion) | (servo is not None)
-        for w, (guard, own) in enumerate(zip(self._guards, self._motions, strict=True)):
+        legs = self._legs_move(motion)
+        alone = self._are_due(span) | (servo is not None) | (legs & bool(self._guards))
+        for w, (guard, own) in enumerate(zip(self._guards, self._motions, strict=bool(self._guards))):
             alone[w] = alone[w] or guard.is_due(own, float(joints.clock[w]), span)
+        for w, state in enumerate(states):
+            alone[w] = alone[w] or (state.footing is not None and state.footing.step is not None)
         self._asked, aims, angles = np.flatnonzero(alone).tolist(), list(self._aims), motion[0].copy()
         for w in self._asked:
             self._bring(w)
-            self._guards[w].before_frame(self._motions[w], span)
+            if self._guards:
+                self._guards[w].before_frame(self._motions[w], span)
             aims[w] = self._motions[w].begin(end, span, servo)
             angles[w] = self._motions[w].robot._angles
         for w in np.flatnonzero(rests & ~alone).tolist():
@@ -144,18 +162,22 @@ class MotionBatch:
             bases = np.array([self._aims[w].q[:7] for w in moves.tolist()])
             found = np.zeros((2, len(moves), self._robot.model.nv))
             found[:, :, 6:] = motion[1:, moves]
+            for k in np.flatnonzero(legs[moves]).tolist():
+                self._tread(int(moves[k]), motion, bases[k], found[:, k, :6])
             for w, q, v, a in zip(
                 moves.tolist(), self._robot.configuration_of(motion[0, moves], bases), *found, strict=True
             ):
                 aims[w] = RobotState(end, q, v, a)
-        self._pending = aims, ~alone, span, motion, desired
+        self._pending, self.aims = (aims, ~alone, span, motion, desired), aims
         return aims, angles
 
-    def end(self) -> None:
-        """Take the step that was worked out last."""
+    def end(self, states: Sequence[RobotState] = ()) -> None:
+        """Take the step that was worked out last; copies with dynamics are in states."""
         for w in self._asked:
             own = self._motions[w]
-            own.joints.take_step()
+            if states:
+                own.take_footing(states[w])
+            own.joints.take_step(self._actual(states[w]) if states else None)
             own.gait.end_frame()
             if self._joints is not None:
                 self._joints.gather(w)
@@ -164,7 +186,13 @@ class MotionBatch:
         elif self._joints is not None and self._pending:
             self._aims, *found = self._pending
             self._joints.take(*found)
+            for w in self._asked if states else ():
+                self._aims[w] = self._motions[w].aim  # a step that ends puts it elsewhere
         self._drop_step()
+
+    def _actual(self, state: RobotState) -> Motion:
+        """Return where the joints are in a state, and how they move, (m,) each."""
+        return self._robot.angles_of(state.q), state.v[6:], state.a[6:]
 
     def cancel(self) -> None:
         """Go back to where all was when the step began."""
@@ -193,13 +221,25 @@ class MotionBatch:
             self._aims = [own.aim for own in self._motions]
         return self._joints
 
-    def _are_due(self, span: float, motion: np.ndarray) -> np.ndarray:
-        """Return whose controllers, legs or walk must be asked in a frame of ``span`` [s] with a motion (3, n, m)."""
+    def _are_due(self, span: float) -> np.ndarray:
+        """Return whose controllers or walk must be asked in a frame of ``span`` [s], (n,) bool."""
+        assert self._joints is not None
+        return self._joints.due(span) | np.array([own.gait.is_walking for own in self._motions])
+
+    def _legs_move(self, motion: np.ndarray) -> np.ndarray:
+        """Return whose legs move in a frame with a motion (3, n, m), (n,) bool."""
         assert self._joints is not None
         legs = self._motions[0].leg_rows
-        due = self._joints.due(span) | np.array([own.gait.is_walking for own in self._motions])
-        due |= (motion[0] != self._joints.motion[0])[:, legs].any(axis=1) | motion[1:, :, legs].any(axis=(0, 2))
-        return due
+        moved = (motion[0] != self._joints.motion[0])[:, legs].any(axis=1)
+        return np.asarray(moved | motion[1:, :, legs].any(axis=(0, 2)))
+
+    def _tread(self, world: int, motion: np.ndarray, base: np.ndarray, base_motion: np.ndarray) -> None:
+        """Let the base (7,) of a copy, and its velocity and acceleration (2, 6), go as its feet stay."""
+        assert self._joints is not None
+        a, b, c = motion[:, world]
+        stood = self._motions[0].stance.base_from(self._aims[world].q, self._joints.motion[0, world], (a, b, c))
+        if stood is not None:
+            base[:], base_motion[:] = stood
 
     def _bring(self, world: int) -> None:
         assert self._joints is not None

@@ -265,10 +265,10 @@ class RobotModel(Coordinates):
         self._place(q[:3].copy(), quat.unit("q[3:7]", q[[6, 3, 4, 5]], (4,)))
 
     def angles_of(self, q: np.ndarray) -> np.ndarray:
-        """Return the joints' angles (n,) in a configuration (nq,)."""
-        angles = q[self._rows]
+        """Return the joints' angles (n,) in a configuration (nq,); of many at once (k, n), in (k, nq)."""
+        angles = q.take(self._rows, axis=-1)
         if len(self._free):
-            angles[self._free] = np.arctan2(q[self._rows[self._free] + 1], angles[self._free])
+            angles[..., self._free] = np.arctan2(q[..., self._rows[self._free] + 1], angles[..., self._free])
         return angles
 
     def move_to(self, angles: np.ndarray, base: np.ndarray | None = None) -> None:

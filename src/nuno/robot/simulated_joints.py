@@ -166,7 +166,7 @@ class SimulatedJoints:
         self._pending = None
         actual = actual or (self.positions, self.velocities, self.accelerations)
         for name, controller in self.controllers.items():
-            if controller.is_busy and controller.check(self.clock, self.desired, actual, self.rows[name]):
+            if controller.check(self.clock, self.desired, actual, self.rows[name]):
                 self._follow(name)
 
     def cancel(self, name: str) -> None:

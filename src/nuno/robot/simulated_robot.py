@@ -323,7 +323,7 @@ class SimulatedRobot(SimulatedBody):
             self.servo(None)
             aim = self._motion.begin(end, span)
         if self.balance is not None and self.is_dynamic:
-            self.balance.dynamics.drive(*self.balance.command(self._state, aim, span, self._servo))
+            self.balance.dynamics.drive(*self.balance.command([self._state], [aim], span, self._servo))
             self.balance.dynamics.lead_fingers(self.actual.angles_of(aim.q))
             return
         self._state = aim
@@ -336,8 +336,8 @@ class SimulatedRobot(SimulatedBody):
         """Take the frame's motion as done."""
         actual = None
         if self.balance is not None and self.is_dynamic:
-            found = self.balance.ended(max(self.world.time - self._state.time, 1e-9))[0]
-            self._state = self.balance.judge(self._state, self._motion.aim, *found, self.world.time)
+            ended = self.balance.ended(max(self.world.time - self._state.time, 1e-9))
+            self._state = self.balance.judge([self._state], [self._motion.aim], ended, self.world.time)[0]
             self._motion.take_footing(self._state)
             angles = self.actual.angles_of(self._state.q)
             self.actual.move_to(angles, self._state.q[:7])

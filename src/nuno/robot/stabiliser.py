@@ -1,16 +1,19 @@
-"""Stabiliser: the aims of a robot on its feet: the motion that is wanted, on its true footing, or a step."""
+"""Stabiliser: the aims of robots on their feet: the motion that is wanted, on their true footing, or a step."""
 
 from __future__ import annotations
 
+import copy
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nuno.robot.aims import Aims, FootAim
+from nuno.robot.aims import Aims, FootAims
 from nuno.robot.capture_step import BEYOND, CaptureStep, Pendulum, carried_on, lifted, nearest_in, outside
 from nuno.robot.carried import Carried
-from nuno.robot.footing import FIRM, STANDS, Footing, Soles, found_footing
+from nuno.robot.foot_kinematics import FeetAndCentre, FootKinematics
+from nuno.robot.footing import FIRM, Footing, Soles, are_planned, found_footings, planned_footings
 from nuno.robot.pinocchio import pin
 from nuno.robot.robot_state import RobotState
 from nuno.robot.sensors import sole_corners
@@ -19,7 +22,6 @@ from nuno.robot.support import convex_outline
 if TYPE_CHECKING:
     from nuno.robot.robot import Robot
 
-WORLD_AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 MOVES = 1e-3
 """[m/s, rad/s] Slower than this a foot is wanted at rest."""
 DT = 1e-3
@@ -34,10 +36,12 @@ LIFTED = 3e-3
 """[m] How far above the other a sole may be that bears nothing, and still stands."""
 MAX_STEPS = 8
 """That it makes for one push."""
+SURELY = 0.9
+"""Share of a disc in a sole, in which a point is inside the soles' outline whatever rounding does."""
 
 
 class Stabiliser:
-    """The aims of a robot on its feet, and its steps where it is pushed.
+    """The aims of robots on their feet, and their steps where they are pushed: of copies of one robot, a world each.
 
     Args:
         robot: The robot.
@@ -48,46 +52,67 @@ class Stabiliser:
     """
 
     def __init__(self, robot: Robot, gravity: Any) -> None:
-        self._model = robot.model
-        self._data, self._wanted = robot.model.createData(), robot.model.createData()
+        self._model, self._data = robot.model, robot.model.createData()
+        self._actual, self._wanted = FeetAndCentre(robot), FeetAndCentre(robot)
+        self._still = np.zeros(robot.model.nv)
         self._feet = [robot.frame_index(foot) for foot in robot.description.feet]
-        self._outlines = [sole_corners(robot.description.frames[foot])[[0, 2, 3, 1]] for foot in robot.description.feet]
+        corners = np.array([sole_corners(robot.description.frames[foot]) for foot in robot.description.feet])
+        self._outlines = list(corners[:, [0, 2, 3, 1]])
+        # of each sole, the radius of the greatest disc in it
+        self._inner = np.abs(corners[:, :, :2]).min(axis=(1, 2))
         self.gravity = float(np.linalg.norm(gravity))
         self._mass, self._weight = robot.mass, robot.mass * self.gravity
-        pin.framesForwardKinematics(robot.model, self._wanted, robot.posture_configuration())
-        places = [self._wanted.oMf[foot].translation.copy() for foot in self._feet]
+        pin.framesForwardKinematics(robot.model, self._data, robot.posture_configuration())
+        places = [self._data.oMf[foot].translation.copy() for foot in self._feet]
         self._stance = float(np.linalg.norm(places[0] - places[-1]))
 
-    def aims(self, now: RobotState, wanted: RobotState, time: float) -> Aims:
-        """Return what the whole-body control is to bring about until a time [s]."""
-        model, ref, footing = self._model, self._wanted, now.footing
-        pin.centerOfMass(model, ref, wanted.q, wanted.v, wanted.a)
-        pin.forwardKinematics(model, ref, wanted.q, wanted.v, wanted.a)
-        pin.updateFramePlacements(model, ref)
-        centre = np.array([ref.com[0], ref.vcom[0], ref.acom[0]])
-        if footing is None:
-            footing = found_footing(None, self._soles_of(None, wanted), self._weight, 0.0)
-        centre[0] += footing.centre
-        feet = []
-        for k, frame in enumerate(self._feet):
-            place = pin.SE3(
-                pin.exp3(footing.tilts[k]) @ ref.oMf[frame].rotation, ref.oMf[frame].translation + footing.offsets[k]
-            )
-            speed = pin.getFrameVelocity(model, ref, frame, WORLD_AXES).vector
-            acceleration = pin.getFrameClassicalAcceleration(model, ref, frame, WORLD_AXES).vector
-            is_late = not footing.bears[k] and not np.abs(speed).max() > MOVES
-            feet.append(FootAim(place, np.array(speed), np.array(acceleration), footing.bears[k], is_late))
-        aims = Aims(centre, wanted.q, wanted.v, wanted.a, tuple(feet))
-        return aims if footing.step is None else self._stepping(now, aims, footing.step, time)
+    def imagined(self) -> Stabiliser:
+        """Return the same for copies of the robot."""
+        made = copy.copy(self)
+        made._data, made._actual, made._wanted = self._model.createData(), self._actual.copy(), self._wanted.copy()
+        return made
 
-    def _stepping(self, now: RobotState, aims: Aims, step: CaptureStep, time: float) -> Aims:
-        """Return the aims of a robot that makes a step to catch itself."""
+    def actual(self, q: Sequence[np.ndarray], v: Sequence[np.ndarray]) -> FootKinematics:
+        """Return how feet move in configurations (nq,) with velocities (nv,), and would while those stay, by world."""
+        return self._actual.of(q, v, [self._still] * len(q))
+
+    def _wanted_of(self, wanted: Sequence[RobotState]) -> FootKinematics:
+        return self._wanted.of([own.q for own in wanted], [own.v for own in wanted], [own.a for own in wanted])
+
+    def aims(self, now: Sequence[RobotState], wanted: Sequence[RobotState], time: float) -> Aims:
+        """Return what the whole-body control is to bring about until a time [s], in each world."""
+        ref = self._wanted_of(wanted)
+        known = [own.footing for own in now]
+        if None in known:
+            planned = planned_footings(ref.places[:, :, 2])
+            known = [own or first for own, first in zip(known, planned, strict=True)]
+        footings = [own for own in known if own is not None]
+        centres, bears = ref.centres.copy(), np.array([own.bears for own in footings])
+        centres[:, 0] += np.array([own.centre for own in footings])
+        tilts = np.array([own.tilts for own in footings])
+        turns = np.zeros(ref.turns.shape)
+        for w, k in np.ndindex(tilts.shape[:2]):
+            turns[w, k] = pin.exp3(tilts[w, k])
+        feet = FootAims(
+            ref.places + np.array([own.offsets for own in footings]), turns @ ref.turns, ref.speeds.copy(),
+            ref.accelerations.copy(), bears, ~bears & ~(np.abs(ref.speeds).max(axis=2) > MOVES),
+        )  # fmt: skip
+        q, v, a = (np.array(part) for part in zip(*((own.q, own.v, own.a) for own in wanted), strict=True))
+        aims = Aims(centres, q, v, a, feet, np.zeros(len(now), dtype=bool))
+        for w, footing in enumerate(footings):
+            if footing.step is not None:
+                self._aim_at_step(aims, w, now[w], footing.step, time)
+        return aims
+
+    def _aim_at_step(self, aims: Aims, w: int, now: RobotState, step: CaptureStep, time: float) -> None:
+        """Change the aims of a world to those of a robot that makes a step to catch itself."""
         pendulum, centre = self._pendulum(now.q, now.v)
-        other = 1 - step.foot
+        other, feet = 1 - step.foot, aims.feet
         ground = pendulum.feet[other, 2]
         goal = np.zeros((3, 3))
         goal[0] = *pendulum.feet[:, :2].mean(axis=0), pendulum.feet[:, 2].mean() + step.height
-        feet = list(aims.feet)
+        feet.places[w], feet.turns[w] = pendulum.feet[:, :3], [_turned(yaw) for yaw in pendulum.feet[:, 3]]
+        feet.speeds[w] = feet.accelerations[w] = 0.0
         if step.landed is None:
             point = nearest_in(pendulum.inner(other), pendulum.point)
             goal[0, 2] = ground + step.height
@@ -95,33 +120,95 @@ class Stabiliser:
             ahead = time + DT * np.array([0.0, -1.0, 1.0])
             here, before, after = (step.pose(own, ground) for own in ahead)
             swing, pushes = (after - before) / (2.0 * DT), (after - 2.0 * here + before) / DT**2
-            feet[step.foot] = FootAim(
-                _placed(here), np.array([*swing[:3], 0.0, 0.0, swing[3]]), np.array([*pushes[:3], 0.0, 0.0, pushes[3]]),
-                False, step.share(time) > 1.0,
+            k = step.foot
+            feet.places[w, k], feet.turns[w, k] = here[:3], _turned(here[3])
+            feet.speeds[w, k], feet.accelerations[w, k] = (
+                (*own[:3], 0.0, 0.0, own[3]) for own in (swing, pushes)
             )  # fmt: skip
-            feet[other] = FootAim(_placed(pendulum.feet[other]), np.zeros(6), np.zeros(6), True)
+            feet.bears[w] = [own != k for own in (0, 1)]
+            feet.sinks[w] = [own == k and step.share(time) > 1.0 for own in (0, 1)]
         else:
-            feet = [
-                FootAim(_placed(own), np.zeros(6), np.zeros(6), bears, True)
-                for own, bears in zip(pendulum.feet, now.footing.bears if now.footing else (True, True), strict=True)
-            ]
-        v, a = aims.v.copy(), aims.a.copy()
-        v[:6] = a[:6] = 0.0
-        return Aims(goal, aims.q, v, a, tuple(feet), step.landed is None)
+            feet.bears[w] = now.footing.bears if now.footing else True
+            feet.sinks[w] = True
+        aims.centres[w] = goal
+        aims.v[w, :6] = aims.a[w, :6] = 0.0
+        aims.falls_freely[w] = step.landed is None
 
-    def footing(
-        self, before: RobotState, wanted: RobotState, q: np.ndarray, v: np.ndarray, pressed: np.ndarray, time: float,
-        load: Carried | None = None,
+    def footings(
+        self, before: Sequence[RobotState], wanted: Sequence[RobotState], q: Sequence[np.ndarray],
+        v: Sequence[np.ndarray], pressed: np.ndarray, time: float, loads: Sequence[Carried | None],
+    ) -> list[Footing]:  # fmt: skip
+        """Return the footings at the end of a frame, with the steps that robots begin or go on with, of each world.
+
+        Args:
+            before: States when the frame began.
+            wanted: How they were to move.
+            q: (nq,) where each is.
+            v: (nv,) how each moves.
+            pressed: (worlds, feet) [N], with what soles press on the ground.
+            time: [s].
+            loads: What each carries.
+        """
+        ref, here = self._wanted_of(wanted), self.actual(q, v)
+        # after a step that is finished, what is wanted begins anew from where the robot stands
+        was = [None if own is None or (own.step is not None and own.step.is_finished) else own
+               for own in (state.footing for state in before)]  # fmt: skip
+        found = list(planned_footings(ref.places[:, :, 2]))
+        known = [w for w, own in enumerate(was) if own is not None]
+        if not known:
+            return found
+        soles = Soles(
+            here.places[known], here.turns[known], ref.places[known], ref.turns[known], ref.speeds[known, :, 2],
+            pressed[known],
+        )  # fmt: skip
+        leans = np.array([self._lean(q[w], wanted[w], ref.places[w], ref.turns[w], loads[w]) for w in known])
+        spans = np.array([time - before[w].time for w in known])
+        own = found_footings([own for own in was if own is not None], soles, self._weight, spans, leans)
+        stays = self._surely_stay(here, ref, own, known) if len(self._feet) == 2 else np.ones(len(known), dtype=bool)
+        for w, footing, stay in zip(known, own, stays.tolist(), strict=True):
+            earlier = was[w]
+            found[w] = footing
+            if earlier is not None and len(self._feet) == 2 and (earlier.step or loads[w] or not stay):
+                pendulum, _ = self._pendulum(q[w], v[w], loads[w])
+                planned = are_planned(ref.places[w : w + 1, :, 2])[0]
+                found[w] = self._stepped(earlier, footing, pendulum, ref.centres[w], planned, pressed[w], time)
+        return found
+
+    def _surely_stay(
+        self, here: FootKinematics, ref: FootKinematics, footings: Sequence[Footing], known: list[int]
+    ) -> np.ndarray:
+        """Return who is surely in balance on the feet and makes no step, (known,) bool, unless it carries a load.
+
+        Discs in the soles, and all that lies between two of them, are in the soles' outline.
+        """
+        centres, places, turns = here.centres[known], here.places[known], here.turns[known]
+        heights = np.maximum(centres[:, 0, 2] - 0.5 * (places[:, 0, 2] + places[:, 1, 2]), 0.1)
+        rates = np.sqrt(self.gravity / heights)[:, None]
+        points = centres[:, 0, :2] + (centres[:, 1, :2] - ref.centres[known, 1, :2]) / rates
+        points = points - ref.centres[known, 2, :2] / rates**2
+        bearing = np.array([own.bears for own in footings]) | are_planned(ref.places[known][:, :, 2])
+        starts = np.where(bearing[:, :1], places[:, 0, :2], places[:, 1, :2])
+        along = np.where(bearing[:, 1:], places[:, 1, :2], places[:, 0, :2]) - starts
+        share = ((points - starts) * along).sum(axis=1) / np.maximum((along * along).sum(axis=1), 1e-12)
+        away = points - starts - np.clip(share, 0.0, 1.0)[:, None] * along
+        radii = (SURELY * self._inner * turns[:, :, 2, 2]).min(axis=1)
+        return ~bearing.any(axis=1) | ((radii > 0.0) & ((away * away).sum(axis=1) < radii * radii))
+
+    def _stepped(
+        self, was: Footing, footing: Footing, pendulum: Pendulum, wanted: np.ndarray, planned: np.ndarray,
+        pressed: np.ndarray, time: float,
     ) -> Footing:  # fmt: skip
-        """Return the footing at the end of a frame, with the step that the robot begins or goes on with."""
-        was, span = before.footing, time - before.time
-        if was is not None and was.step is not None and was.step.is_finished:
-            was = None  # what is wanted begins anew from where the robot stands
-        soles = self._soles_of((q, pressed), wanted)
-        footing = found_footing(was, soles, self._weight, span, self._lean(q, wanted, soles, load))
-        if len(self._feet) != 2 or was is None:
-            return footing
-        pendulum, _ = self._pendulum(q, v, load)
+        """Return a footing with the step that the robot begins or goes on with.
+
+        Args:
+            was: That when the frame began.
+            footing: Without a step.
+            pendulum: The robot.
+            wanted: (3, 3) place, velocity and acceleration of the centre of mass that were wanted.
+            planned: (2,) bool, which feet are to stand.
+            pressed: (2,) [N].
+            time: [s].
+        """
         touches = tuple(bool(force > FIRM * self._weight) for force in pressed)
         step = was.step
         if step is not None:
@@ -132,13 +219,11 @@ class Stabiliser:
             step = carried_on(step, pendulum, touches[step.foot], time)
             if step.landed is None:
                 return replace(footing, step=step)
-        model, ref = self._model, self._wanted
         point = pendulum.point
         if step is None:
-            pin.centerOfMass(model, ref, wanted.q, wanted.v, wanted.a)
             # what keeps the capture point as far from where it is wanted as it is; at rest that is the point itself
-            point = point - ref.vcom[0][:2] / pendulum.rate - ref.acom[0][:2] / pendulum.rate**2
-        bearing = [k for k in (0, 1) if footing.bears[k] or (step is None and _is_planned(soles, k))]
+            point = point - wanted[1, :2] / pendulum.rate - wanted[2, :2] / pendulum.rate**2
+        bearing = [k for k in (0, 1) if footing.bears[k] or (step is None and planned[k])]
         if not bearing:
             return replace(footing, step=step)
         outline = convex_outline(np.concatenate([pendulum.outlines[k] for k in bearing]))
@@ -149,10 +234,9 @@ class Stabiliser:
             step, frames = found or step, 0
         return replace(footing, step=step, frames=frames)
 
-    def ground(self, q: np.ndarray) -> float:
-        """Return the height of the lowest sole in a configuration [m]."""
-        pin.framesForwardKinematics(self._model, self._wanted, q)
-        return float(min(self._wanted.oMf[foot].translation[2] for foot in self._feet))
+    def grounds(self, wanted: Sequence[RobotState]) -> np.ndarray:
+        """Return the heights of the lowest soles that are wanted, (worlds,) [m]."""
+        return self._wanted_of(wanted).places[:, :, 2].min(axis=1)
 
     def _pendulum(self, q: np.ndarray, v: np.ndarray, load: Carried | None = None) -> tuple[Pendulum, np.ndarray]:
         """Return the robot as a pendulum, and the place of its centre of mass."""
@@ -174,41 +258,23 @@ class Stabiliser:
         pendulum = Pendulum(point, speed[:2], rate, height, feet, tuple(outlines), self._stance)  # type: ignore[arg-type]
         return pendulum, centre
 
-    def _lean(self, q: np.ndarray, wanted: RobotState, soles: Soles, load: Carried | None) -> np.ndarray:
+    def _lean(
+        self, q: np.ndarray, wanted: RobotState, places: np.ndarray, turns: np.ndarray, load: Carried | None
+    ) -> np.ndarray:
         """Return by how much (3,) [m] a robot that stands leans back from its load, so that both are over its soles.
 
-        A walk was planned with its load.
+        A walk was planned with its load. Wanted soles are at places (feet, 3) and have turns (feet, 3, 3).
         """
         if load is None or np.abs(wanted.v[:6]).max() > 0.0:
             return np.zeros(3)
-        there = np.array(pin.centerOfMass(self._model, self._wanted, wanted.q))[:2]
-        now = np.array(pin.centerOfMass(self._model, self._data, q))[:2]
+        there, now = (np.array(pin.centerOfMass(self._model, self._data, own))[:2] for own in (wanted.q, q))
         both = there + load.mass / (load.mass + self._mass) * (load.place[:2] - now)
-        corners = [
-            own @ place.rotation[:2].T + place.translation[:2]
-            for own, place in zip(self._outlines, soles.wanted, strict=True)
-        ]
+        corners = [own @ turn[:2].T + place[:2] for own, place, turn in zip(self._outlines, places, turns, strict=True)]
         outline = convex_outline(np.concatenate(corners))
         middle = outline.mean(axis=0)
         back = (nearest_in(middle + MIN_SHARE * (outline - middle), both) - both) * (1.0 + load.mass / self._mass)
         return np.array([*back, 0.0])
 
-    def _soles_of(self, actual: tuple[np.ndarray, np.ndarray] | None, wanted: RobotState) -> Soles:
-        """Return the soles in a configuration, with what they press, and as they are wanted."""
-        model, ref, data = self._model, self._wanted, self._data
-        pin.forwardKinematics(model, ref, wanted.q, wanted.v)
-        pin.updateFramePlacements(model, ref)
-        sinking = np.array([pin.getFrameVelocity(model, ref, foot, WORLD_AXES).linear[2] for foot in self._feet])
-        there = [ref.oMf[foot].copy() for foot in self._feet]
-        if actual is None:
-            return Soles(there, there, sinking, None)
-        pin.framesForwardKinematics(model, data, actual[0])
-        return Soles([data.oMf[foot].copy() for foot in self._feet], there, sinking, actual[1])
 
-
-def _is_planned(soles: Soles, k: int) -> bool:
-    return bool(soles.wanted[k].translation[2] < min(own.translation[2] for own in soles.wanted) + STANDS)
-
-
-def _placed(pose: np.ndarray) -> Any:
-    return pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, float(pose[3])), pose[:3].copy())
+def _turned(yaw: float) -> np.ndarray:
+    return np.asarray(pin.rpy.rpyToMatrix(0.0, 0.0, float(yaw)))

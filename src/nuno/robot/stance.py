@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -63,8 +64,7 @@ class Stance:
     def _bearing(self) -> int:
         """Return the number of the foot that bears the robot where it is."""
         self._robot.update()
-        heights = [float(sole.translation[2]) for sole in self._soles]
-        return heights.index(min(heights)) if min(heights) < heights[0] - LOWER else 0
+        return _lower(self._soles)
 
     def base(self, present: np.ndarray, motion: Motion) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]] | None:
         """Return where the base goes and how it moves, None where it stays.
@@ -77,19 +77,46 @@ class Stance:
             Position and quaternion (x, y, z, w) of the base (7,), and its velocity and acceleration (6,) each in its
             own frame.
         """
-        robot, (positions, velocities, accelerations) = self._robot, motion
-        moving = (positions != present) | (velocities != 0.0) | (accelerations != 0.0)
-        legs_move = [moving[rows].any() for rows in self._rows]
+        legs_move = self._legs_move(present, motion)
         if not any(legs_move):
             return None
         k = self._bearing()
-        if not legs_move[k]:
+        return self._carried_by(k, self._soles[k], motion) if legs_move[k] else None
+
+    def base_from(
+        self, q: np.ndarray, present: np.ndarray, motion: Motion
+    ) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]] | None:
+        """Return what `base` does for a copy of the robot that is in a configuration q (nq,) now."""
+        legs_move = self._legs_move(present, motion)
+        if not any(legs_move):
             return None
+        model, data = self._robot.model, self._robot.scratch
+        pin.forwardKinematics(model, data, q)
+        soles = [carrier * own for (carrier, *_), own in zip(self._carriers, self._placements, strict=True)]
+        k = _lower(soles)
+        return self._carried_by(k, soles[k], motion) if legs_move[k] else None
+
+    def _legs_move(self, present: np.ndarray, motion: Motion) -> list[bool]:
+        positions, velocities, accelerations = motion
+        moving = (positions != present) | (velocities != 0.0) | (accelerations != 0.0)
+        return [bool(moving[rows].any()) for rows in self._rows]
+
+    def _carried_by(
+        self, k: int, sole: Any, motion: Motion
+    ) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:  # fmt: skip
+        """Return the base and its motion as one foot keeps its place."""
+        robot, (positions, velocities, accelerations) = self._robot, motion
         model = robot.model
         v, a = np.zeros(model.nv), np.zeros(model.nv)
         v[6:], a[6:] = velocities, accelerations
         pin.forwardKinematics(model, robot.scratch, robot.configuration_of(positions, IDENTITY), v, a)
         # seen from the base the foot moves; as it stands, the base moves against that
         carrier, velocity, acceleration = self._carriers[k]
-        placed = self._soles[k] * (carrier * self._placements[k]).inverse()
+        placed = sole * (carrier * self._placements[k]).inverse()
         return pin.SE3ToXYZQUAT(placed), (-carrier.act(velocity).vector, -carrier.act(acceleration).vector)
+
+
+def _lower(soles: Sequence[Any]) -> int:
+    """Return the number of the sole that bears, of Pinocchio's placements: the first, unless another is lower."""
+    heights = [float(sole.translation[2]) for sole in soles]
+    return heights.index(min(heights)) if min(heights) < heights[0] - LOWER else 0

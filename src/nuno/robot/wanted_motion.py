@@ -53,9 +53,9 @@ class WantedMotion:
         return self.stance.rows
 
     def take(self, state: RobotState) -> None:
-        """Be how a state says, whose joints ``joints`` has already: as after a frame in which no leg moved."""
+        """Be how a state says, whose joints ``joints`` has already."""
         self.aim = state
-        self.robot.move_to(self.joints.positions)
+        self.robot.move_to(self.joints.positions, state.q[:7])
 
     def begin(self, end: float, span: float, servo: Servo | None = None) -> RobotState:
         """Return how the robot is to move at a time ``end`` [s], ``span`` [s] from now; ``end_frame`` takes that."""

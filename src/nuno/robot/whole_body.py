@@ -9,13 +9,16 @@ references as well as they can.
 
 from __future__ import annotations
 
+import copy
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nuno.errors import MissingPackageError
-from nuno.robot.aims import Aims, FootAim
+from nuno.robot.aims import Aims
+from nuno.robot.foot_kinematics import WORLD_AXES, FootKinematics
 from nuno.robot.pinocchio import pin
 from nuno.robot.robot_state import RobotState
 from nuno.robot.sensors import sole_corners
@@ -38,7 +41,6 @@ LEGS = 0.01
 """Weight of the posture of legs, of that of other joints."""
 EQUAL = 5
 """DAQP's mark of a constraint that is an equality."""
-WORLD_AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +48,7 @@ class Gains:
     """Weights of the tasks, and how fast errors are to vanish.
 
     Attributes:
-        centre, trunk, foot, posture, force: Weights.
+        centre, trunk, foot, posture, force: Weights, above 0.
         catch, swing: Weights of the centre of mass along the ground and of the foot in the air, in a step that catches
             the robot.
         centre_rate, trunk_rate, foot_rate, posture_rate: Of the double pole that errors follow [1/s].
@@ -86,7 +88,8 @@ class WholeBodyControl:
         self._nothing = np.zeros(self._model.nv)
         self.gains = gains or Gains()
         self._feet = [robot.frame_index(foot) for foot in robot.description.feet]
-        self._corners = [EDGE * sole_corners(robot.description.frames[foot]) for foot in robot.description.feet]
+        corners = [EDGE * sole_corners(robot.description.frames[foot]) for foot in robot.description.feet]
+        self._corners = np.array(corners).reshape(-1, 4, 3)
         limits = robot.effort_limits
         self._efforts = np.where(np.isfinite(limits) & (limits > 0.0), limits, 1e9)
         chains = [set(robot.model.supports[robot.model.frames[foot].parentJoint]) for foot in self._feet]
@@ -105,117 +108,142 @@ class WholeBodyControl:
         flat = friction / np.sqrt(2.0)
         self._pyramid = np.array([[1.0, 0, -flat], [-1.0, 0, -flat], [0, 1.0, -flat], [0, -1.0, -flat], [0, 0, -1.0]])
 
+    def imagined(self) -> WholeBodyControl:
+        """Return the same for copies of the robot."""
+        made = copy.copy(self)
+        made._data, made._programs = self._model.createData(), {}
+        return made
+
     def solve(
-        self, now: RobotState, aims: Aims, loads: np.ndarray | None = None
-    ) -> tuple[np.ndarray, np.ndarray] | None:
-        """Return accelerations (nv,) of base and joints and torques (n,) of the joints, None where there are none.
+        self, now: Sequence[RobotState], motion: FootKinematics, aims: Aims
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
+        """Return accelerations of base and joints and torques of the joints, of each world.
 
         Args:
-            now: How the robot moves.
+            now: How the robots move, and what they carry.
+            motion: How feet and centres of mass move while velocities stay as they are.
             aims: What is wanted.
-            loads: (njoints, 6) [N, N m] on Pinocchio's joints in their own frames, or None.
+
+        Returns:
+            (worlds,) bool, where there are any that fulfil the constraints, accelerations (worlds, nv), and torques
+            (worlds, n).
         """
-        model, data, gains = self._model, self._data, self.gains
-        nv, none = model.nv, self._nothing
-        pin.computeJointJacobians(model, data, now.q)
-        pin.centerOfMass(model, data, now.q, now.v, none)
-        drift, centre, speed = (np.array(own[0]) for own in (data.acom, data.com, data.vcom))
-        centre_rows = np.array(pin.jacobianCenterOfMass(model, data, now.q))
-        mass = np.array(pin.crba(model, data, now.q, pin.Convention.WORLD))
-        mass[self._below] = mass.T[self._below]
-        forced = () if loads is None else (pin.StdVec_Force([pin.Force(own) for own in loads]),)
-        bias = np.array(pin.rnea(model, data, now.q, now.v, none, *forced))
-        pin.forwardKinematics(model, data, now.q, now.v, none)
-        pin.updateFramePlacements(model, data)
-
-        tasks, weights = self._tasks.copy(), self._weights.copy()
-        wanted = np.zeros(len(tasks))
-        pull = _back(gains.centre_rate, aims.centre[0] - centre, aims.centre[1] - speed)
-        if aims.falls_freely:
-            pull[:2] = 0.0
-        tasks[:3], wanted[:3] = centre_rows, aims.centre[2] + pull - drift
-        if aims.falls_freely:
-            weights[:2] = gains.catch
-        error = pin.difference(model, now.q, aims.q)
-        across = pin.Quaternion(now.q[3:7]).toRotationMatrix().T @ pin.Quaternion(aims.q[3:7]).toRotationMatrix()
-        wanted[3:6] = across @ aims.a[3:6] + _back(gains.trunk_rate, error[3:6], across @ aims.v[3:6] - now.v[3:6])
-        wanted[6:nv] = aims.a[6:] + _back(gains.posture_rate, error[6:], (aims.v - now.v)[6:])
-        touching: list[np.ndarray] = []
-        for k, (frame, corners, aim) in enumerate(zip(self._feet, self._corners, aims.feet, strict=True)):
-            row = slice(nv + 6 * k, nv + 6 * k + 6)
-            own = np.array(pin.getFrameJacobian(model, data, frame, WORLD_AXES))
-            tasks[row] = own
-            if aims.falls_freely and not aim.bears:
-                weights[row] = gains.swing
-            wanted[row] = self._foot(data, frame, aim)
-            if aim.bears:
-                touching.append(own[:3] - _skew(corners @ data.oMf[frame].rotation.T) @ own[3:])
+        gains, worlds, nv, feet = self.gains, len(now), self._model.nv, len(self._feet)
+        tasks = np.empty((worlds, *self._tasks.shape))
+        tasks[:] = self._tasks
+        errors, mass, bias = np.empty((worlds, nv)), np.empty((worlds, nv, nv)), np.empty((worlds, nv))
+        for w, state in enumerate(now):
+            self._linearised(state, aims.q[w], tasks[w], mass[w], bias[w], errors[w])
+        mass[:, self._below[0], self._below[1]] = mass[:, self._below[1], self._below[0]]
+        v, free = np.array([state.v for state in now]), aims.falls_freely
+        wanted = np.empty(tasks.shape[:2])
+        pull = _back(gains.centre_rate, *(aims.centres[:, :2] - motion.centres[:, :2]).swapaxes(0, 1))
+        pull[free, :2] = 0.0
+        wanted[:, :3] = aims.centres[:, 2] + pull - motion.centres[:, 2]
+        turning, spinning = aims.a[:, 3:6].copy(), aims.v[:, 3:6].copy()
+        for w in np.flatnonzero(turning.any(axis=1) | spinning.any(axis=1)).tolist():
+            across = _matrix(now[w].q).T @ _matrix(aims.q[w])
+            turning[w], spinning[w] = across @ turning[w], across @ spinning[w]
+        wanted[:, 3:6] = turning + _back(gains.trunk_rate, errors[:, 3:6], spinning - v[:, 3:6])
+        wanted[:, 6:nv] = aims.a[:, 6:] + _back(gains.posture_rate, errors[:, 6:], (aims.v - v)[:, 6:])
+        wanted[:, nv:] = self._feet_wanted(motion, aims).reshape(worlds, 6 * feet)
+        weights = np.tile(self._weights, (worlds, 1))
+        weights[free, :2] = gains.catch
+        swings = free[:, None] & ~aims.feet.bears
+        weights[:, nv:][np.repeat(swings, 6, axis=1)] = gains.swing
+        rows = tasks[:, nv:].reshape(worlds, feet, 6, nv)
+        arms = _skew(self._corners @ motion.turns.swapaxes(-1, -2))
+        touching = rows[:, :, None, :3] - arms @ rows[:, :, None, 3:]  # (worlds, feet, 4, 3, nv)
         roots = np.sqrt(weights)
-        return self._minimised(roots[:, None] * tasks, roots * wanted, touching, mass, bias)
+        return self._minimised(roots[:, :, None] * tasks, roots * wanted, touching, aims.feet.bears, mass, bias)
 
-    def _foot(self, data: Any, frame: int, aim: FootAim) -> np.ndarray:
-        """Return the acceleration (6,) that a foot is to have beside what the joints' velocities bring about."""
-        model, gains = self._model, self.gains
-        fall = pin.getFrameClassicalAcceleration(model, data, frame, WORLD_AXES).vector
-        speed = pin.getFrameVelocity(model, data, frame, WORLD_AXES).vector
-        place = data.oMf[frame]
-        error = np.empty(6)
-        error[:3] = aim.place.translation - place.translation
-        error[3:] = pin.log3(aim.place.rotation @ place.rotation.T)
-        if aim.bears:
-            pull = error * (0, 0, 0, 1, 1, 0) if np.abs(error[3:5]).max() > LEVEL else np.zeros(6)
-            found = 4.0 * gains.stand_rate * gains.foot_rate * pull - gains.stand_rate * speed
-        else:
-            found = aim.acceleration + _back(gains.foot_rate, error, aim.speed - speed)
-            if aim.sinks:
-                found[2] = -gains.stand_rate * (SINKS + speed[2])
-        return np.asarray(found - fall)
+    def _linearised(
+        self, now: RobotState, q: np.ndarray, tasks: np.ndarray, mass: np.ndarray, bias: np.ndarray, error: np.ndarray
+    ) -> None:
+        """Fill in rows of the tasks of one world, its masses (upper triangle), forces at rest, and how far q is."""
+        model, data, nv = self._model, self._data, self._model.nv
+        tasks[:3] = pin.jacobianCenterOfMass(model, data, now.q)
+        mass[:] = pin.crba(model, data, now.q, pin.Convention.WORLD)
+        for k, foot in enumerate(self._feet):
+            pin.updateFramePlacement(model, data, foot)
+            tasks[nv + 6 * k : nv + 6 * k + 6] = pin.getFrameJacobian(model, data, foot, WORLD_AXES)
+        forced = () if now.loads is None else (pin.StdVec_Force([pin.Force(own) for own in now.loads]),)
+        bias[:] = pin.rnea(model, data, now.q, now.v, self._nothing, *forced)
+        error[:] = pin.difference(model, now.q, q)
+
+    def _feet_wanted(self, motion: FootKinematics, aims: Aims) -> np.ndarray:
+        """Return the accelerations (worlds, feet, 6) of feet beside what the joints' velocities bring about."""
+        gains, feet = self.gains, aims.feet
+        errors = np.empty(motion.speeds.shape)
+        errors[:, :, :3] = feet.places - motion.places
+        across = feet.turns @ motion.turns.swapaxes(-1, -2)
+        for w, k in np.ndindex(errors.shape[:2]):
+            errors[w, k, 3:] = pin.log3(across[w, k])
+        tilted = np.abs(errors[:, :, 3:5]).max(axis=2, keepdims=True) > LEVEL
+        pull = np.where(tilted, errors * (0, 0, 0, 1, 1, 0), 0.0)
+        stand = 4.0 * gains.stand_rate * gains.foot_rate * pull - gains.stand_rate * motion.speeds
+        swing = feet.accelerations + _back(gains.foot_rate, errors, feet.speeds - motion.speeds)
+        sinking = -gains.stand_rate * (SINKS + motion.speeds[:, :, 2])
+        swing[:, :, 2] = np.where(feet.sinks, sinking, swing[:, :, 2])
+        return np.where(feet.bears[:, :, None], stand, swing) - motion.accelerations
 
     def _minimised(
-        self, tasks: np.ndarray, wanted: np.ndarray, touching: list[np.ndarray], mass: np.ndarray, bias: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray] | None:
-        """Return accelerations and torques that miss the tasks least; None where nothing fulfils the constraints."""
-        n, count = len(bias), sum(map(len, touching))
-        hessian, linear, constraints, upper, lower, sense = (part.copy() for part in self._program(count))
-        hessian[:n, :n] += tasks.T @ tasks
-        linear[:n] = -tasks.T @ wanted
-        constraints[:n, :n] = mass
-        if touching:
-            constraints[:n, n:] = -np.concatenate(touching).reshape(3 * count, n).T
-        motion = constraints[:n]
-        upper[:6] = lower[:6] = -bias[:6]
-        upper[6:n] -= bias[6:]
-        lower[6:n] -= bias[6:]
-        found, _, flag, _ = daqp.solve(hessian, linear, constraints, upper, lower, sense)
-        if flag <= 0:
-            return None
-        return np.asarray(found[:n]), np.asarray((motion @ found + bias)[6:])
+        self, tasks: np.ndarray, wanted: np.ndarray, touching: np.ndarray, bears: np.ndarray, mass: np.ndarray,
+        bias: np.ndarray,
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
+        """Return the motions and torques that miss the tasks least, as `solve` does."""
+        (worlds, n), each = bias.shape, touching.shape[2]
+        transposed = tasks.swapaxes(1, 2)
+        hessians, linears = transposed @ tasks, -(transposed @ wanted[:, :, None])[:, :, 0]
+        is_found, motions, efforts = np.zeros(worlds, dtype=bool), np.zeros((worlds, n)), np.zeros((worlds, n - 6))
+        for w, own in enumerate(bears):
+            count = each * int(own.sum())
+            proximity, hessian, linear, constraints, upper, lower, sense = self._program(count)
+            hessian[:n, :n] = proximity + hessians[w]
+            linear[:n] = linears[w]
+            constraints[:n, :n] = mass[w]
+            if count:
+                constraints[:n, n:] = -touching[w, own].reshape(3 * count, n).T
+            upper[:6] = lower[:6] = -bias[w, :6]
+            upper[6:n], lower[6:n] = self._efforts - bias[w, 6:], -self._efforts - bias[w, 6:]
+            # without DAQP's search for directions in which nothing is minimised: there are none
+            found, _, flag, _ = daqp.solve(hessian, linear, constraints, upper, lower, sense, eps_prox=0.0)
+            if flag > 0:
+                is_found[w], motions[w] = True, found[:n]
+                efforts[w] = (constraints[:n] @ found + bias[w])[6:]
+        return is_found, motions, efforts
 
     def _program(self, count: int) -> tuple[np.ndarray, ...]:
-        """Return what of the quadratic program is the same in every frame with so many points that bear."""
+        """Return the arrays of the quadratic program with so many points that bear, after what proximity adds to it.
+
+        What is not the same in every frame is filled in anew by whoever asks.
+        """
         if count not in self._programs:
             n = self._model.nv
             rows, columns = n + 5 * count, n + 3 * count
             hessian, constraints = np.zeros((columns, columns)), np.zeros((rows, columns))
-            hessian[:n, :n] = 1e-6 * np.eye(n)
             hessian[n:, n:] = self.gains.force * np.eye(3 * count)
             for k in range(count):
                 constraints[n + 5 * k : n + 5 * k + 5, n + 3 * k : n + 3 * k + 3] = self._pyramid
-            upper = np.concatenate([np.zeros(6), self._efforts, np.zeros(5 * count)])
-            lower = np.concatenate([np.zeros(6), -self._efforts, np.full(5 * count, -1e30)])
-            sense = np.zeros(rows, dtype=np.int32)
+            upper, lower, sense = np.zeros(rows), np.full(rows, -1e30), np.zeros(rows, dtype=np.int32)
             sense[:6] = EQUAL
-            self._programs[count] = hessian, np.zeros(columns), constraints, upper, lower, sense
+            proximity = 1e-6 * np.eye(n)
+            self._programs[count] = proximity, hessian, np.zeros(columns), constraints, upper, lower, sense
         return self._programs[count]
 
 
 def _skew(arms: np.ndarray) -> np.ndarray:
-    """Return the matrices (k, 3, 3) of the cross products with vectors (k, 3)."""
-    made = np.zeros((len(arms), 3, 3))
-    made[:, 2, 1], made[:, 0, 2], made[:, 1, 0] = arms.T
-    made[:, 1, 2], made[:, 2, 0], made[:, 0, 1] = -arms.T
+    """Return the matrices (..., 3, 3) of the cross products with vectors (..., 3)."""
+    made, (x, y, z) = np.zeros((*arms.shape, 3)), np.moveaxis(arms, -1, 0)
+    made[..., 2, 1], made[..., 0, 2], made[..., 1, 0] = x, y, z
+    made[..., 1, 2], made[..., 2, 0], made[..., 0, 1] = -x, -y, -z
     return made
 
 
 def _back(rate: float, error: np.ndarray, speed: np.ndarray) -> np.ndarray:
     return rate * rate * error + 2.0 * rate * speed
+
+
+def _matrix(q: np.ndarray) -> np.ndarray:
+    """Return the rotation matrix (3, 3) of the base in a configuration (nq,)."""
+    return np.asarray(pin.Quaternion(q[3:7]).toRotationMatrix())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -95,11 +96,22 @@ class CouplingResults:
                         found.append((world, i, int(shape[c]), normal[c].astype(float), force))
         return pressed, found
 
-    def impulses(self) -> np.ndarray:
-        """(worlds, bodies, bodies, 3) [N s], what contacts between two bodies gave the first in the last frame."""
+    def impulses(self, rows: Sequence[int]) -> dict[int, dict[int, np.ndarray]]:
+        """Return what contacts with each of the others gave some bodies in the last frame, (worlds, 3) [N s].
+
+        By the body, and by the other: those between which there was any in some world.
+        """
         given = self._impulses.numpy().reshape(self.world_count, self._bodies, self._bodies, 3)
-        given = given * (IMPULSE_UNIT * np.sqrt(self._rate))
-        return given - np.swapaxes(given, 1, 2)
+        pairs = np.unique(np.flatnonzero(given) // 3 % self._bodies**2)
+        pushing = np.zeros((self._bodies, self._bodies), dtype=bool)
+        pushing.ravel()[pairs] = True
+        pushing |= pushing.T
+        unit = IMPULSE_UNIT * np.sqrt(self._rate)
+        return {
+            row: {other: given[:, row, other] * unit - given[:, other, row] * unit
+                  for other in np.flatnonzero(pushing[row]).tolist()}
+            for row in rows
+        }  # fmt: skip
 
     def tie_forces(self) -> np.ndarray:
         """(worlds, ties, 3) [N], the mean force over the last frame on the points of the ties' own bodies."""

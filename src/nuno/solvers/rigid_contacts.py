@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
+import warp as wp
 
 from nuno.rigid.manifold import POINTS
-from nuno.rigid.rigid_arrays import RigidArrays
+from nuno.rigid.rigid_arrays import SAVED, RigidArrays
+from nuno.rigid.saved_contacts import LASTING, LISTING
 from nuno.shapes.quaternion import rotate
 
 
@@ -74,14 +76,39 @@ class RigidContacts(RigidArrays):
         One is left out if it bounced away and another took its place in the row and pressed, all within the frame.
         """
         impulse, met = self._entries("impulse"), self._entries("met")
-        owner = self.table.parts.slot.numpy()
+        rows = np.unique(np.flatnonzero(impulse) // 3)
+        world, part, _ = np.unravel_index(rows, met.shape)
+        pairs = np.stack([self.table.parts.slot.numpy()[part], met.ravel()[rows]], axis=1)
+        # each gives the one and takes from the other, in the order of worlds, parts and rows
+        given = impulse.reshape(-1, 3)[rows]
+        given, worlds = np.stack([given, -given], axis=1).reshape(-1, 3), np.repeat(world, 2)
+        sides = np.stack([pairs, pairs[:, ::-1]], axis=1).reshape(-1, 2)
+        keys = sides[:, 0].astype(np.int64) * (1 << 32) + sides[:, 1]
         found: dict[int, dict[int, np.ndarray]] = {}
-        for world, p, k in np.argwhere(impulse.any(axis=-1)):
-            a, b = int(owner[p]), int(met[world, p, k])
-            for one, other, sign in ((a, b, 1.0), (b, a, -1.0)):
-                total = found.setdefault(one, {}).setdefault(other, np.zeros((self.world_count, 3)))
-                total[world] += sign * impulse[world, p, k]
+        _, firsts, kinds = np.unique(keys, return_index=True, return_inverse=True)
+        for kind in np.argsort(firsts).tolist():
+            own, (one, other) = kinds == kind, sides[firsts[kind]].tolist()
+            total = np.zeros((self.world_count, 3))
+            np.add.at(total, worlds[own], given[own])
+            found.setdefault(one, {})[other] = total
         return found
+
+    def copies(self, into: Mapping[tuple[str, str], wp.array]) -> dict[tuple[str, str], wp.array]:
+        """Return copies of all that the next step depends on, by whose it is and its name.
+
+        Args:
+            into: Copies of before that are not needed any more, or none: new memory takes longer than the copy.
+        """
+        made = {}
+        for owner, names in (("state", SAVED), ("manifolds", (*LASTING, *LISTING))):
+            for name in names:
+                own, there = getattr(getattr(self, owner), name), into.get((owner, name))
+                if there is None or there.size != own.size:
+                    made[owner, name] = wp.clone(own)
+                else:
+                    wp.copy(there, own)
+                    made[owner, name] = there
+        return made
 
     def contact_count(self) -> np.ndarray:
         """(worlds,) int: points at which bodies press on each other."""

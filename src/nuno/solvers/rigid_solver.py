@@ -247,12 +247,10 @@ class RigidSolver(RigidContacts):
 
     def finite(self, slot: int | None = None) -> np.ndarray:
         """(worlds,) bool: whether a body, or every body, has a finite state."""
-        slots = list(self.part_rows) if slot is None else [slot]
-        result = np.ones(self.world_count, dtype=bool)
-        for name in SAVED[:4]:
-            for each in slots:
-                result &= np.isfinite(self._read(name, each)).all(axis=-1)
-        return result
+        if slot is None:
+            motions = self.motions(list(self.part_rows))
+            return np.all([np.isfinite(part).all(axis=(1, 2)) for part in motions], axis=0)
+        return np.all([np.isfinite(self._read(name, slot)).all(axis=-1) for name in SAVED[:4]], axis=0)
 
     # Time
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -91,7 +92,13 @@ class Advancing(Simulation):
             elif not self._run_looking(now, stop, look, instants, moving if careful else None):
                 return False
             now = stop
-        broken = [(body, np.atleast_1d(dynamics.finite())) for body, dynamics in moving.items()]
+        rigid: Any = next((dynamics for dynamics in moving.values() if dynamics.is_rigid), None)
+        sound = rigid is not None and rigid.solver.finite().all()  # all of them at once
+        broken = [
+            (body, np.atleast_1d(dynamics.finite()))
+            for body, dynamics in moving.items()
+            if not (sound and dynamics.is_rigid)
+        ]
         if self._must_repeat(moving):
             return False
         self._stepping.careful = not self._quiet and are_fast(moving)
@@ -136,15 +143,15 @@ class Advancing(Simulation):
 
     def _must_repeat(self, moving: dict[Body, Dynamics]) -> bool:
         """Return True if the run is to be gone through again: a list was too short, or a cloth fast unexpectedly."""
-        longer = self._make_room()
+        longer = self._make_room(moving)
         if not self._quiet and not self._stepping.careful and are_fast(moving):
             self._stepping.careful = True
             return True
         return longer
 
-    def _make_room(self) -> bool:
+    def _make_room(self, moving: dict[Body, Dynamics]) -> bool:
         """Make lists longer that were too short since this was asked last; return whether any is."""
-        return any([d.make_room(b) for b in self._bodies.values() if isinstance(d := dynamics_of(b), ParticleDynamics)])
+        return any([own.make_room(body) for body, own in moving.items() if isinstance(own, ParticleDynamics)])
 
     def _run_looking(
         self, time: float, stop: float, look: Callable[[float], None], instants: np.ndarray | None,

@@ -174,11 +174,11 @@ class CoupledBodies(CoupledTables):
         rows = [k for k, body in enumerate(self.bodies) if body in own]
         if not rows:
             return {}
-        given, found = self.coupling.impulses(), {}
-        for row in rows:
+        found = {}
+        for row, given in self.coupling.impulses(rows).items():
             body = self.bodies[row]
-            kept = np.where(self.kept[body][:, None, None], given[:, row], 0.0)
-            found[own[body]] = {self.bodies[k].name: kept[:, k] for k in np.flatnonzero(kept.any(axis=(0, 2)))}
+            kept = {k: np.where(self.kept[body][:, None], impulse, 0.0) for k, impulse in given.items()}
+            found[own[body]] = {self.bodies[k].name: impulse for k, impulse in kept.items() if impulse.any()}
         return found
 
     def shape_contacts(self, body: Body) -> tuple[np.ndarray, list[tuple[int, int, int, np.ndarray, np.ndarray]]]:

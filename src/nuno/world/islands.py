@@ -54,8 +54,11 @@ def find_islands(world: Simulation, moving: list[Body], duration: float, substep
     joined = np.zeros((len(moving), len(moving), world.world_count), dtype=bool)
     near = joined
     if len(moving) > 1:
-        low, high = (np.stack(corner) for corner in zip(*(_box(world, body, duration) for body in moving), strict=True))
-        near = np.asarray((low[:, None] <= high[None]).all(axis=-1) & (low[None] <= high[:, None]).all(axis=-1))
+        low, high = _boxes(world, moving, duration)
+        below = low[0][:, None] <= high[0]
+        for axis in (1, 2):
+            below &= low[axis][:, None] <= high[axis]
+        near = below & below.swapaxes(0, 1)
     for a, b in np.argwhere(np.triu(near.any(axis=-1), 1)):
         if world._rules.touch(moving[a], moving[b]):
             joined[a, b] = near[a, b]
@@ -82,8 +85,10 @@ def holding(grip: Grip, worlds: int) -> np.ndarray:
 
 def _connected(joined: np.ndarray) -> np.ndarray:
     """Return (n, worlds), the first of all that each of n is joined to, through others too; joined (n, n, worlds)."""
-    a, b, column = np.nonzero(joined)
     n, worlds = joined.shape[1:]
+    if worlds > 1 and (joined == joined[..., :1]).all():
+        return np.repeat(_connected(joined[..., :1]), worlds, axis=1)
+    a, b, column = np.nonzero(joined)
     first = np.repeat(np.arange(n)[:, None], worlds, axis=1)
     while True:
         least = np.minimum(first[a, column], first[b, column])
@@ -97,19 +102,23 @@ def _connected(joined: np.ndarray) -> np.ndarray:
         first = found
 
 
-def _box(world: Simulation, body: Body, duration: float) -> tuple[np.ndarray, np.ndarray]:
-    """The box (worlds, 3) that a body may reach within ``duration`` [s]: lower and upper corner."""
-    dynamics: Any = body._dynamics
+def _boxes(world: Simulation, moving: list[Body], duration: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the boxes that bodies may reach within ``duration`` [s]: lower and upper corners (3, bodies, worlds)."""
+    every: list[Any] = [body._dynamics for body in moving]
     fall = 0.5 * float(np.linalg.norm(world.gravity)) * duration**2
-    if dynamics.is_rigid:
-        middle, _ = dynamics.solver.pose(dynamics.slot)
-        velocity, spin = dynamics.solver.velocity(dynamics.slot)
-        radius = dynamics.radius
-        speed = np.linalg.norm(velocity, axis=-1) + np.linalg.norm(spin, axis=-1) * radius
-        grow = (radius + GROWTH * speed * duration + fall + SLACK)[:, None]
-        return middle - grow, middle + grow
-    low, high = dynamics.solver.bounds()
-    speed, _ = dynamics.solver.speeds()
-    thickness = np.asarray(getattr(dynamics.material, "thickness", 0.0), dtype=float)
-    grow = (GROWTH * speed * duration + fall + SLACK + thickness)[:, None]
-    return low - grow, high + grow
+    low, high = np.empty((2, 3, len(moving), world.world_count))
+    rigid = [k for k, own in enumerate(every) if own.is_rigid]
+    if rigid:
+        middles, _, velocities, spins = every[rigid[0]].solver.motions([every[k].slot for k in rigid])
+        radii = np.array([every[k].radius for k in rigid])
+        speeds = np.linalg.norm(velocities, axis=-1) + np.linalg.norm(spins, axis=-1) * radii
+        grow = (radii + GROWTH * speeds * duration + fall + SLACK)[..., None]
+        low[:, rigid], high[:, rigid] = (middles - grow).T, (middles + grow).T
+    for k, dynamics in enumerate(every):
+        if not dynamics.is_rigid:
+            lowest, highest = dynamics.solver.bounds()
+            speed, _ = dynamics.solver.speeds()
+            thickness = np.asarray(getattr(dynamics.material, "thickness", 0.0), dtype=float)
+            grow = (GROWTH * speed * duration + fall + SLACK + thickness)[:, None]
+            low[:, k], high[:, k] = (lowest - grow).T, (highest + grow).T
+    return low, high
