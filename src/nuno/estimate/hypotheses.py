@@ -133,7 +133,7 @@ _MISTAKES = tuple(
     for sign in (-1.0, 1.0)
 )
 
-_LATER = (*SHEARING[::2], _loose(1e-6, 0.25), *_MISTAKES)
+_LATER = SHEARING[::2] + _MISTAKES
 _SHORT: dict[str, Any] = dict(any_way=True, settle_seconds=1.5, reflects=False)
 """Stages of few candidates, among many guesses."""
 
@@ -152,7 +152,7 @@ DISCRETISATIONS = (
         20, 14,
         (
             _firm(8e-4, 0.25), _firm(3e-5, 0.5), _firm(3e-4, 0.5), _firm(1.6e-3, 0.5),
-            _loose(3e-5, 0.25, hand=_HIGHER), _loose(3e-4, 0.5, hand=_LOWER),
+            _loose(1e-6, 0.25), _loose(3e-5, 0.25, hand=_HIGHER), _loose(5e-6, 0.5, hand=_LOWER), _loose(3e-4, 0.5),
         ),
         best=4, **_SHORT,
     ),
@@ -168,10 +168,9 @@ first and sideways then, that it is a standard deviation higher or lower than it
 cloth that is led up first swings, and takes half as much time again as others to be imagined. So such guesses look at
 nearly every candidate only where the best of seven straight ways fits poorly: these then often take the true candidate
 for one of the worst. All but the stages between are on a coarser mesh, which ranks the true one about as high in less
-than half of the time; different meshes together rank it higher than any. The limpest cloth touches itself all over, so
-that it takes three times as long as a stiff one on either mesh; it is on the coarser. After the first three, guesses go
-the way that is likelier by then. Those last stages look at candidates that many guesses have left, so that reflections
-tell nothing new, and most of their cloths hang still after 1.5 s.
+than half of the time; different meshes together rank it higher than any. After the first three, guesses go the way that
+is likelier by then. Those last stages look at the few candidates that many guesses have left, so that reflections tell
+nothing new, and most of their cloths hang still after 1.5 s.
 """
 
 OF_OUTLINES = tuple(replace(stage, cells=12, substeps=8) for stage in DISCRETISATIONS[:3]) + DISCRETISATIONS[3:]
