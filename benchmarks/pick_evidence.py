@@ -220,6 +220,7 @@ def work(
     import warp as wp
 
     from nuno import NunoError
+    from nuno.estimate.hypotheses import DISCRETISATIONS
     from nuno.estimate.ranking import SURE
 
     wp.config.log_level = wp.LOG_ERROR
@@ -230,11 +231,9 @@ def work(
         from nuno.estimate import pick_trials
 
         pick_trials.mirrored = lambda *_: None
-    if options.settle is not None:
-        from nuno.estimate import futures
-
-        futures.SETTLE_SECONDS = options.settle
     sure, stages = SURE if options.stop else 1.0, stages_named(options.stages)
+    if options.settle is not None:
+        stages = tuple(replace(stage, settle_seconds=options.settle) for stage in stages or DISCRETISATIONS)
     with (folder / f"{number}.jsonl").open("w") as lines:
         while time.time() < deadline and not jobs.empty():
             try:

@@ -6,7 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.signal import correlate2d
+from threadpoolctl import threadpool_info, threadpool_limits
 
+from nuno.estimate import outline_net
 from nuno.estimate.learned import HAND_MADE_SHARE, LEARNED_SHARE
 from nuno.estimate.outline_net import LEVELS, SCALARS, SIZE, _convolved, log_ratios, weights
 
@@ -89,3 +91,17 @@ def test_silhouettes_of_scenes_held_out_are_explained_better():
     assert alone == pytest.approx(-0.84, abs=0.01)
     assert mean_log_probability() > alone + 0.3
     assert mean_log_probability(order=np.random.default_rng(0).permutation(32)) < alone - 0.5
+
+
+def test_small_products_are_one_threads_work(monkeypatch):
+    """While the network is asked one thread multiplies matrices, and afterwards as many as before."""
+
+    def threads():
+        return [pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"]
+
+    asked = []
+    monkeypatch.setattr(outline_net, "_forward", lambda *_: asked.append(threads()) or np.zeros(1))
+    with threadpool_limits(2, user_api="blas"):
+        log_ratios(np.zeros((SIZE, SIZE)), np.zeros((1, SIZE, SIZE)), np.zeros((1, SCALARS)))
+        assert set(threads()) == {2}
+    assert len(asked) == 1 and set(asked[0]) == {1}

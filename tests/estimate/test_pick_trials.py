@@ -27,6 +27,9 @@ STAGES = (
 ups: list[int] = []
 """How many guesses of each stage went up first in what was looked at last."""
 
+reflected: list[int] = []
+"""How many guesses the stages had whose futures were reflected then."""
+
 
 def looked_at(
     monkeypatch: pytest.MonkeyPatch, chamfer: float, stages: tuple[Discretisation, ...] = STAGES, **changes: Any
@@ -34,6 +37,7 @@ def looked_at(
     """How many candidates of six each stage looks at, where all fit alike but for two, which are ``chamfer`` px off."""
     numbers: list[int] = []
     ups.clear()
+    reflected.clear()
 
     def compare(futures: Any, chosen: np.ndarray, seen: Any, given: Any) -> Comparison:
         numbers.append(len(chosen))
@@ -49,9 +53,12 @@ def looked_at(
     def imagine(candidates: np.ndarray, discretisation: Discretisation, **_: Any) -> Any:
         return SimpleNamespace(discretisation=discretisation, candidates=len(candidates))
 
+    def reflect(futures: Any, *_: Any) -> None:
+        reflected.append(len(futures.discretisation.hypotheses))
+
     monkeypatch.setattr(pick_trials, "compare", compare)
     monkeypatch.setattr(pick_trials, "imagine_picks", imagine)
-    monkeypatch.setattr(pick_trials, "mirrored", lambda *_: None)
+    monkeypatch.setattr(pick_trials, "mirrored", reflect)
     given = settings(discretisations=stages, turns=(0.0,), learned=False, sideways=None, **changes)
     seen: Any = SimpleNamespace(warnings=())
     pick_trials.try_picks(given, RECTANGLE, lambda: seen, Stages("imagine", "see", "compile", "compare"))
@@ -85,3 +92,10 @@ def test_later_guesses_go_the_likelier_way(monkeypatch):
     way = np.array([(0.0, 0.0, 0.0), (0.0, 0.0, 0.1), (0.0, 0.0, 0.2)])
     looked_at(monkeypatch, 1.5, hand_path=way)
     assert ups == [0, 2, 0]
+
+
+def test_a_stage_may_leave_reflections_out(monkeypatch):
+    """Futures of stages that do not reflect are not asked about other candidates."""
+    stages = (STAGES[0], replace(STAGES[1], reflects=False), STAGES[2])
+    looked_at(monkeypatch, 6.0, stages=stages)
+    assert reflected == [2, 10]

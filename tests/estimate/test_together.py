@@ -1,5 +1,7 @@
 """Stages imagined in one batch: each finds what it would have imagined by itself, to the bit."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,7 @@ import nuno
 from nuno.camera.rectangle import ClothRectangle
 from nuno.camera.table import Table
 from nuno.estimate import pick_trials, together
-from nuno.estimate.futures import imagine_picks, solver_of
+from nuno.estimate.futures import LIFT_SECONDS, imagine_picks, solver_of
 from nuno.estimate.hypotheses import HYPOTHESES, Discretisation
 from nuno.estimate.together import alike, imagine_together
 
@@ -51,6 +53,18 @@ def test_a_part_is_what_the_stage_imagines_by_itself(both, settings, stage, chos
     for a, b in zip(*(s.velocities_apart() for s in solvers), strict=True):
         np.testing.assert_array_equal(a[place], b[number])
     np.testing.assert_array_equal(solvers[0].positions()[place], solvers[1].positions()[number])
+
+
+def test_a_stage_that_takes_less_time_to_rest_shares_the_batch(settings):
+    """Its cloths are those of its own last look, the other's are as ever, bit for bit."""
+    short, chosen = replace(FIRST, best=4, settle_seconds=0.25), np.array([0, 5])
+    both = imagine_together((short, STAGES[1]), chosen, UV, **settings)
+    for stage in both.stages:
+        part = both.part(stage, chosen)
+        alone = imagine_picks(candidates=UV[chosen], discretisation=stage, **settings)
+        np.testing.assert_array_equal(part.positions.numpy(), alone.positions.numpy())
+    longer = imagine_picks(candidates=UV[chosen], discretisation=FIRST, **settings)
+    assert longer.world.time > LIFT_SECONDS + 0.25 + 1e-6  # it would have gone on
 
 
 def test_what_is_not_in_the_batch_is_told(both):

@@ -16,7 +16,7 @@ from nuno.camera.rectangle import ClothRectangle
 from nuno.camera.table import Table
 from nuno.dynamics.dynamics import ParticleDynamics
 from nuno.engines.world_view import dynamics_of
-from nuno.estimate.coming_to_rest import LOOK_SECONDS, SETTLE_SECONDS, ComingToRest, mean_speeds, slow_part
+from nuno.estimate.coming_to_rest import LOOK_SECONDS, ComingToRest, mean_speeds, slow_part
 from nuno.estimate.hypotheses import Discretisation, cell_counts
 from nuno.estimate.lift_path import paths_of_hands
 from nuno.estimate.outline_body import grips_on, outline_body
@@ -234,13 +234,13 @@ def _settle(futures: Futures, begin: Callable[..., Futures], elapsed: float, may
         elapsed: Since they were begun [s].
         may_leave: Whether those at rest leave the batch.
     """
-    batch, settled = futures, 0.0
+    batch, settled, longest = futures, 0.0, futures.discretisation.settle_seconds
     resting = ComingToRest(futures.world.world_count)
     over = False
     while not over:
         batch.world.run(LOOK_SECONDS, progress=False)
         settled += LOOK_SECONDS
-        over = resting.look(_speeds(batch.body)) or settled >= SETTLE_SECONDS
+        over = resting.look(_speeds(batch.body)) or settled >= longest
         before = resting.going
         stay = np.zeros(len(before), dtype=bool) if over else resting.leave() if may_leave else None
         if stay is None:

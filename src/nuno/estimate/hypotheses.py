@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from nuno.estimate.coming_to_rest import SETTLE_SECONDS
 from nuno.estimate.hand_error import GROSS
 
 
@@ -56,6 +57,9 @@ class Discretisation:
             at no more than otherwise.
         any_way: Where the hand's way is not known, as large a share of its guesses goes up first as that way is likely
             by what was looked at before.
+        settle_seconds: At most so long its cloths may take to come to rest in the hand [s].
+        reflects: Whether its futures, reflected, count for candidates that it passes over
+            (`nuno.estimate.mirrored`).
     """
 
     cells: int
@@ -64,6 +68,8 @@ class Discretisation:
     best: int | None = None
     share_if_poor: float | None = None
     any_way: bool = False
+    settle_seconds: float = SETTLE_SECONDS
+    reflects: bool = True
 
     def with_up_first(self, share: float) -> Discretisation:
         """The same with a ``share`` of the guesses, 0 to 1, going up first, evenly spread; those that do still do."""
@@ -128,6 +134,8 @@ _MISTAKES = tuple(
 )
 
 _LATER = SHEARING[::2] + _MISTAKES
+_SHORT: dict[str, Any] = dict(any_way=True, settle_seconds=1.5, reflects=False)
+"""Stages of few candidates, among many guesses."""
 
 DISCRETISATIONS = (
     Discretisation(15, 10, (_firm(1e-4, 0.25), _firm(2e-3, 0.5), _loose(3e-5, 0.5))),
@@ -138,7 +146,7 @@ DISCRETISATIONS = (
     Discretisation(
         20, 14,
         (_loose(3e-4, 0.25), _firm(8e-4, 0.5, hand=_HIGHER), _loose(1e-3, 0.25), _firm(1e-4, 0.5, hand=_LOWER)),
-        best=8, any_way=True,
+        best=6, **_SHORT,
     ),
     Discretisation(
         20, 14,
@@ -146,9 +154,9 @@ DISCRETISATIONS = (
             _firm(8e-4, 0.25), _firm(3e-5, 0.5), _firm(3e-4, 0.5), _firm(1.6e-3, 0.5),
             _loose(1e-6, 0.25), _loose(3e-5, 0.25, hand=_HIGHER), _loose(5e-6, 0.5, hand=_LOWER), _loose(3e-4, 0.5),
         ),
-        best=6, any_way=True,
+        best=4, **_SHORT,
     ),
-    Discretisation(15, 10, _LATER, best=4, any_way=True),
+    Discretisation(15, 10, _LATER, best=4, **_SHORT),
 )  # fmt: skip
 """Stages, which end as soon as a candidate is sure (`nuno.estimate.ranking.SURE`).
 
@@ -161,7 +169,8 @@ cloth that is led up first swings, and takes half as much time again as others t
 nearly every candidate only where the best of seven straight ways fits poorly: these then often take the true candidate
 for one of the worst. All but the stages between are on a coarser mesh, which ranks the true one about as high in less
 than half of the time; different meshes together rank it higher than any. After the first three, guesses go the way that
-is likelier by then. A CPU takes sixteen worlds at once: so many candidates fill them.
+is likelier by then. Those last stages look at the few candidates that many guesses have left, so that reflections tell
+nothing new, and most of their cloths hang still after 1.5 s.
 """
 
 OF_OUTLINES = tuple(replace(stage, cells=12, substeps=8) for stage in DISCRETISATIONS[:3]) + DISCRETISATIONS[3:]

@@ -135,7 +135,10 @@ def try_picks(
         if k == 0 and settings.learned and settings.with_evidence:
             outline = outline_of(seen.mask, seen.hidden, settings.camera, hand)
         comparisons.append(_compared(futures, chosen, seen, settings, outline))
-        others = mirrored(futures, chosen, uv, rectangle, table, hand, settings.hand_std) if is_open else None
+        others = (
+            mirrored(futures, chosen, uv, rectangle, table, hand, settings.hand_std)
+            if is_open and discretisation.reflects else None
+        )  # fmt: skip
         reflected.append([] if others is None else _of_each_kind(others, seen, settings, outline))
         batches.append(futures)
         ranked = doubted(_all(comparisons, reflected), settings.score, len(uv), prior)

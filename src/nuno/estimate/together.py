@@ -10,6 +10,7 @@ asked. What no stage asks for was in vain, and what a stage asks for beyond it i
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -18,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.errors import SimulationDiverged
-from nuno.estimate.coming_to_rest import LOOK_SECONDS, REST_SPEED, SETTLE_SECONDS, ComingToRest, mean_speeds
+from nuno.estimate.coming_to_rest import LOOK_SECONDS, REST_SPEED, ComingToRest, mean_speeds
 from nuno.estimate.futures import LIFT_SECONDS, Futures, begin_picks, solver_of
 from nuno.estimate.hypotheses import Discretisation
 
@@ -127,7 +128,8 @@ class Together:
         hypotheses = first + np.arange(len(stage.hypotheses))
         columns = np.array([int(np.nonzero(self.candidates == c)[0][0]) for c in chosen])
         places = (hypotheses[:, None] * len(self.candidates) + columns).ravel()
-        batch, moments = self.batch, self.moments
+        # as late as it may be by this stage; another in the batch may let its cloths take longer
+        batch, moments = self.batch, self.moments[: _looks(stage)]
         return Part(
             batch.world, batch.body, batch.origin, len(chosen), stage, batch, moments, moments_of_rest(moments, places),
             places,
@@ -219,10 +221,16 @@ def imagine_together(
         del moments[first:]
 
     # once the fastest is at rest, any part of them is
-    while len(moments) * LOOK_SECONDS < SETTLE_SECONDS and not (moments and moments[-1].speeds.max() < REST_SPEED):
+    most = max(map(_looks, stages))
+    while len(moments) < most and not (moments and moments[-1].speeds.max() < REST_SPEED):
         first = len(moments)
-        instants = world.time + LOOK_SECONDS * np.arange(1, LOOKS + 1)
+        instants = world.time + LOOK_SECONDS * np.arange(1, min(LOOKS, most - first) + 1)
         end = float(instants[-1])
         with world._call():
             world._advance(end - world.time, end, look, instants, look_again)
     return Together(batch, stages, chosen, tuple(moments))
+
+
+def _looks(stage: Discretisation) -> int:
+    """The most times that a stage looks at its cloths."""
+    return max(1, math.ceil(stage.settle_seconds / LOOK_SECONDS))
