@@ -169,8 +169,9 @@ def list_row(s: RigidState, parts: Parts, c: Contacts, rules: Rules, world: int,
         q = c.partner[first + k]
         if q >= 0:
             stays = int(0)
-            if parts.slot[q] >= 0 and stands_in_row_of(s, parts, world, p, q):
-                if apart(s, parts, world, p, q) <= reach and pair_friction(rules, s, world, a, parts.slot[q]) >= 0.0:
+            if parts.slot[q] >= 0:
+                mu = pair_friction(rules, s, world, a, parts.slot[q])
+                if mu >= 0.0 and stands_in_row_of(s, parts, world, p, q) and apart(s, parts, world, p, q) <= reach:
                     stays = 1
             if stays == 0:
                 c.partner[first + k] = -1
