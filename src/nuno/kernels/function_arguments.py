@@ -14,17 +14,18 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
+from nuno.kernels.warp_functions import wrap_function
+
 
 def look_for_function_arguments_where_taken() -> bool:
     """Let Warp look for them only where a function takes some from now on, and return whether this version can."""
     from warp._src import codegen
-    from warp._src.context import Function
 
-    look = getattr(codegen, "iter_call_callable_arg_targets", None)
-    if look is None:
-        return False
-    if getattr(look, "looks_where_taken", False):
-        return True
+    return wrap_function(codegen, "iter_call_callable_arg_targets", _looking_where_taken)
+
+
+def _looking_where_taken(look: Any) -> Any:
+    from warp._src.context import Function
 
     def iter_call_callable_arg_targets(adj: Any, func: Any, *args: Any, **options: Any) -> Iterable[Any]:
         if isinstance(func, Function) and not func.is_builtin() and not _takes_functions(func, Function):
@@ -32,9 +33,7 @@ def look_for_function_arguments_where_taken() -> bool:
         found: Iterable[Any] = look(adj, func, *args, **options)
         return found
 
-    iter_call_callable_arg_targets.looks_where_taken = True  # type: ignore[attr-defined]
-    codegen.iter_call_callable_arg_targets = iter_call_callable_arg_targets
-    return True
+    return iter_call_callable_arg_targets
 
 
 def _takes_functions(func: Any, kind: type) -> bool:

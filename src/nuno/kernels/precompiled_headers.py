@@ -22,6 +22,7 @@ from typing import Any
 
 import warp as wp
 
+from nuno.kernels.warp_functions import wrap_function
 from nuno.numbers.cpu_compiler import compile_quickly
 
 MODULE = "nuno.kernels.precompiled_headers"
@@ -110,12 +111,10 @@ def _take_headers() -> bool:
     """Have threads that are `compiling` take what was read ahead, and return whether this version of Warp can."""
     from warp._src import context
 
-    own = _own_folder()
-    if own is None:
-        return False
-    if getattr(own, "takes_headers", False):
-        return True
+    return wrap_function(context.runtime, "get_clang_pch_dir", _taking_headers)
 
+
+def _taking_headers(own: Any) -> Any:
     def get_clang_pch_dir() -> str | None:
         folder: str | None = own()
         written: threading.Event | None = getattr(_here, "source_written", None)
@@ -125,6 +124,4 @@ def _take_headers() -> bool:
                 _copy(_read_ahead(), Path(folder))
         return folder
 
-    get_clang_pch_dir.takes_headers = True  # type: ignore[attr-defined]
-    context.runtime.get_clang_pch_dir = get_clang_pch_dir  # type: ignore[attr-defined]
-    return True
+    return get_clang_pch_dir

@@ -19,30 +19,28 @@ import ast
 from typing import Any
 
 from nuno.kernels.out_of_line import OUT_OF_LINE
+from nuno.kernels.warp_functions import wrap_function
 
 
 def pass_structs_by_reference() -> bool:
     """Let Warp write references for Nuno's functions from now on, and return whether this version of it can."""
     from warp._src import codegen
 
-    write = getattr(codegen, "codegen_func", None)
-    if write is None:
-        return False
-    if getattr(write, "passes_structs_by_reference", False):
-        return True
+    return wrap_function(codegen, "codegen_func", _with_structs_by_reference)
 
+
+def _with_structs_by_reference(write: Any) -> Any:
     def codegen_func(adj: Any, *args: Any, **options: Any) -> str:
         if not getattr(adj.func, "__module__", "").startswith("nuno."):
-            return write(adj, *args, **options)
+            text: str = write(adj, *args, **options)
+            return text
         if options.get("device", "cpu") == "cuda":
             options["inline_hint"] = options.get("inline_hint") or "forceinline"
         elif f"{adj.func.__module__}.{adj.fun_name}" in OUT_OF_LINE:
             options["inline_hint"] = "noinline"
         return _with_references(adj, write(adj, *args, **options), options.get("device", "cpu"))
 
-    codegen_func.passes_structs_by_reference = True  # type: ignore[attr-defined]
-    codegen.codegen_func = codegen_func
-    return True
+    return codegen_func
 
 
 def _with_references(adj: Any, text: str, device: str) -> str:
