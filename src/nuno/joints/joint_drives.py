@@ -9,14 +9,17 @@ from typing import Any
 import numpy as np
 
 from nuno.errors import InvalidInputError
-from nuno.validation import as_array, finite_array
+from nuno.validation import Shape, as_array, finite_array
 
 DRIVES = (
     "lower", "upper", "friction", "stiffness", "damping", "position", "velocity", "max_effort", "spring", "rest",
     "spring_damping",
 )  # fmt: skip
 """Numbers of a drive along the free direction, in the solver's order."""
-
+Shapes = tuple[Shape, ...]
+OF_ONE: Shapes = ((), ("worlds",))
+OF_MANY: Shapes = (("joints",), ("worlds", "joints"))
+"""The shapes that a value may have, of a joint and of many."""
 
 SLACK = 1e-6
 """[N m s/rad] or [N s/m] Damping of a motor that has none, by which it exerts an effort."""
@@ -104,10 +107,12 @@ def drive_table(worlds: int, values: dict[str, Any], before: np.ndarray | None =
     return table
 
 
-def _checked(name: str, value: Any, *, low: float = -np.inf, endless: bool = False) -> np.ndarray:
+def _checked(
+    name: str, value: Any, *, low: float = -np.inf, endless: bool = False, shapes: Shapes = OF_ONE
+) -> np.ndarray:
     if endless and as_array(name, value).ndim == 0 and value == np.inf:
         return np.array(np.inf)
-    checked = finite_array(name, value, (), ("worlds",))
+    checked = finite_array(name, value, *shapes)
     if (checked < low).any():
         raise InvalidInputError(f"{name} must be at least {low:g}, got {value!r}")
     return checked
@@ -187,22 +192,17 @@ def motor_table(
     Raises:
         InvalidInputError: a value that no motor can have.
     """
-    given = {"position": positions, "velocity": velocities, "stiffness": stiffness, "damping": damping}
-    made = {name: _checked_all(name, values) for name, values in {**given, "effort": effort}.items()}
+    given = {"position": positions, "velocity": velocities, "stiffness": stiffness, "effort": effort}
+    made = {name: _checked(name, values, shapes=OF_MANY) for name, values in given.items()}
+    made["damping"] = _checked("damping", damping, low=0.0, shapes=OF_MANY)
     most = np.asarray(max_effort, dtype=float)
     if not (most >= 0.0).all():
         raise InvalidInputError(f"max_effort must be at least 0, got {most.min():g}")
     if not (made["stiffness"] > 0.0).all():
         raise InvalidInputError("a motor that goes to a position needs a stiffness")
-    if (made["damping"] < 0.0).any():
-        raise InvalidInputError(f"damping must be at least 0, got {made['damping'].min():g}")
     # what the gains make of a wish so much further
     position = made["position"] + made.pop("effort") / made["stiffness"]
     return {**made, "position": position, "max_effort": most}
-
-
-def _checked_all(name: str, values: Any) -> np.ndarray:
-    return finite_array(name, values, ("joints",), ("worlds", "joints"))
 
 
 def spring_drives(kind: str, value: Spring | None) -> dict[str, Any]:
