@@ -16,7 +16,7 @@ fast frames once (``thorough=False``), as hands that are points always do here.
 The third imagines futures of 1 s of a sheet of 20 x 20 cells that two hands fold, through ``nuno.plan`` with one
 iteration: rollouts a second, plans a second, and what of a plan is imagining the batch, setting it on its way,
 simulating and scoring, medians. The first plan of a row, which compiles kernels where that was not done, stands by
-itself. On CUDA ``nuno.plans.run_blocks_many`` (up to 158 rollouts ``run_blocks_shared``) takes long to compile.
+itself. On CUDA ``nuno.plans.run_blocks_small`` (up to 158 rollouts ``run_blocks_shared``) takes long to compile.
 ``--thorough`` imagines with doubles, and fast frames twice.
 """
 

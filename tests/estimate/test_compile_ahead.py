@@ -21,7 +21,7 @@ from nuno.kernels import compile_watch
 from nuno.kernels.module_loads import wait_for_load
 from nuno.plans.block_plan import FEW_THREADS, MANY_THREADS
 
-BATCHES = (("nuno.plans.run_blocks_shared", FEW_THREADS), ("nuno.plans.run_blocks_many", MANY_THREADS))
+BATCHES = (("nuno.plans.run_blocks_shared", FEW_THREADS), ("nuno.plans.run_blocks_small", MANY_THREADS))
 
 
 @pytest.fixture

@@ -150,7 +150,7 @@ def solved(method, plain, cells, differ, doubles, flag=None, strain=0.0):
 @pytest.mark.long
 @pytest.mark.parametrize("differ", [False, True], ids=["uniform", "each its own"])
 @pytest.mark.parametrize("cells", [(5, 8), (9, 33), (64, 6), (200, 4)])
-def test_eight_edges_a_thread_are_solved_exactly(cells, differ):
+def test_four_and_eight_edges_a_thread_are_solved_exactly(cells, differ):
     """Direct solution: elimination from end to end, to the digits of a float; coordinates, 0.5 m, round to 6e-8 m."""
     for found, expected in solved(_by_threads, _plain, cells, differ, False):
         np.testing.assert_allclose(found, expected, rtol=0, atol=1.2e-7 + DIGITS * np.abs(expected).max())

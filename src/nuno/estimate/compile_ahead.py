@@ -17,7 +17,7 @@ from nuno.estimate import pattern, similarity
 from nuno.kernels.kernel_cache import is_cached
 from nuno.kernels.module_loads import load_ahead, wait_for_load, wait_for_source
 from nuno.kernels.precompiled_headers import begin_to_read_headers
-from nuno.plans.block_plan import FEW_THREADS, MANY_THREADS, run_blocks_many, run_blocks_shared
+from nuno.plans.block_plan import FEW_THREADS, MANY_THREADS, run_blocks_shared, run_blocks_small
 from nuno.plans.cloth_worlds import run_lanes
 from nuno.plans.cpu_threads import core_count
 from nuno.state import pack
@@ -26,7 +26,7 @@ log = logging.getLogger(__name__)
 
 THREADS = 2
 """On the CPU: the longest module takes longer than all others together."""
-BATCHES = ((run_blocks_shared, FEW_THREADS), (run_blocks_many, MANY_THREADS))
+BATCHES = ((run_blocks_shared, FEW_THREADS), (run_blocks_small, MANY_THREADS))
 """On CUDA, of some and of many futures; each is compiled for most of a minute. A clear case has only some, a doubtful
 one has many later on."""
 

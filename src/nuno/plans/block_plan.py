@@ -15,6 +15,7 @@ from nuno.numbers.crew import barrier, crew_of
 from nuno.plans.shared_memory import (
     DOUBLE_PARTICLES,
     SHARED_PARTICLES,
+    SMALL_PARTICLES,
     WHOLE_PARTICLES,
     bring_figures,
     bring_masses,
@@ -25,6 +26,7 @@ from nuno.plans.shared_memory import (
     counts,
     double_column,
     figures,
+    small_column,
     whole,
 )
 from nuno.plans.substep import advance
@@ -86,8 +88,8 @@ def advance_block(
 # A module each, so that only the kind that is run is compiled. Quotients and roots as the processor has them, which
 # may be off by two in the last place: a tenth of the time, and the same bits for the same input all the same.
 for _name in (
-    "run_blocks", "run_blocks_partly", "run_blocks_shared", "run_blocks_many", "run_double_blocks",
-    "run_double_blocks_partly",
+    "run_blocks", "run_blocks_partly", "run_blocks_shared", "run_blocks_many", "run_blocks_small",
+    "run_double_blocks", "run_double_blocks_partly",
 ):  # fmt: skip
     wp.get_module(f"nuno.plans.{_name}").options["fast_math"] = True
 
@@ -143,53 +145,59 @@ def run_blocks_partly(
         search_for_others(s, topo, sizes, run, tid / size - s.worlds, tid % size, size)
 
 
-@wp.func
-def advance_blocks_shared(
-    s: StateFloat, topo: Topology, sizes: Sizes, run: Settings, shapes: Shapes, substeps: int, block: int, rank: int,
-    size: int,
-):  # fmt: skip
-    """The same with x, y, z, w and p in shared memory, and what contacts move particles by."""
-    n = topo.particles
-    t = view(s, block, n, sizes)
-    outside = view(s, block, n, sizes)
-    t.x = column(0)
-    t.y = column(WHOLE_PARTICLES)
-    t.z = column(2 * WHOLE_PARTICLES)
-    t.w = column(3 * WHOLE_PARTICLES)
-    t.px = column(4 * WHOLE_PARTICLES)
-    t.py = column(5 * WHOLE_PARTICLES)
-    t.pz = column(6 * WHOLE_PARTICLES)
-    t.moved = whole(column(7 * WHOLE_PARTICLES))
-    bring_places(t, outside, n, rank, size)
-    bring_masses(t, outside, n, rank, size)
-    bring_starts(t, outside, n, rank, size)
-    for i in range(rank, 4 * n, size):
-        t.moved[i] = 0
-    advance_block(t, t, topo, run, shapes, substeps, rank, size)
-    bring_places(outside, t, n, rank, size)
-    bring_starts(outside, t, n, rank, size)
+def _queue(own: Any, room: int) -> Any:
+    """Return `advance_from_queue` for worlds of at most ``room`` particles, in the shared memory ``own``."""
 
+    @wp.func(name=f"advance_blocks_of_{room}")
+    def advance_blocks_shared(
+        s: StateFloat, topo: Topology, sizes: Sizes, run: Settings, shapes: Shapes, substeps: int, block: int,
+        rank: int, size: int,
+    ):  # fmt: skip
+        """The same with x, y, z, w and p in shared memory, and what contacts move particles by."""
+        n = topo.particles
+        t = view(s, block, n, sizes)
+        outside = view(s, block, n, sizes)
+        t.x = own(0)
+        t.y = own(room)
+        t.z = own(2 * room)
+        t.w = own(3 * room)
+        t.px = own(4 * room)
+        t.py = own(5 * room)
+        t.pz = own(6 * room)
+        t.moved = whole(own(7 * room))
+        bring_places(t, outside, n, rank, size)
+        bring_masses(t, outside, n, rank, size)
+        bring_starts(t, outside, n, rank, size)
+        for i in range(rank, 4 * n, size):
+            t.moved[i] = 0
+        advance_block(t, t, topo, run, shapes, substeps, rank, size)
+        bring_places(outside, t, n, rank, size)
+        bring_starts(outside, t, n, rank, size)
 
-@wp.func
-def advance_from_queue(
-    s: StateFloat, topo: Topology, sizes: Sizes, run: Settings, shapes: Shapes, substeps: int, slice_length: int,
-    block: int,
-    rank: int, size: int,
-):  # fmt: skip
-    """Take ``slice_length`` substeps at a time, whole frames, of the world that is next; or all of one world."""
-    slices = s.worlds * ((substeps + slice_length - 1) / slice_length)
-    k = int(block)
-    if slice_length < substeps:
-        k = next_slice(s.work_counts, s.worlds, slices)
-    while k < slices:
-        world = k % s.worlds
-        left = substeps - k / s.worlds * slice_length
-        advance_blocks_shared(s, topo, sizes, run, shapes, wp.min(slice_length, left), world, rank, size)
+    @wp.func(name=f"advance_from_queue_of_{room}")
+    def advance_from_queue(
+        s: StateFloat, topo: Topology, sizes: Sizes, run: Settings, shapes: Shapes, substeps: int, slice_length: int,
+        block: int, rank: int, size: int,
+    ):  # fmt: skip
+        """Take ``slice_length`` substeps at a time, whole frames, of the world that is next; or all of one world."""
+        slices = s.worlds * ((substeps + slice_length - 1) / slice_length)
+        k = int(block)
         if slice_length < substeps:
-            end_slice(s.work_counts, world)
             k = next_slice(s.work_counts, s.worlds, slices)
-        else:
-            k = slices
+        while k < slices:
+            world = k % s.worlds
+            left = substeps - k / s.worlds * slice_length
+            advance_blocks_shared(s, topo, sizes, run, shapes, wp.min(slice_length, left), world, rank, size)
+            if slice_length < substeps:
+                end_slice(s.work_counts, world)
+                k = next_slice(s.work_counts, s.worlds, slices)
+            else:
+                k = slices
+
+    return advance_from_queue
+
+
+advance_whole, advance_small = _queue(column, int(WHOLE_PARTICLES)), _queue(small_column, int(SMALL_PARTICLES))
 
 
 @wp.kernel(enable_backward=False, launch_bounds=(FEW_THREADS, 1), module="nuno.plans.run_blocks_shared")
@@ -206,7 +214,7 @@ def run_blocks_shared(
     """The same with x, y, z, w and p in shared memory, and what contacts move particles by."""
     tid = wp.tid()
     if tid / size < s.worlds:
-        advance_from_queue(s, topo, sizes, run, shapes, substeps, slice_length, tid / size, tid % size, size)
+        advance_whole(s, topo, sizes, run, shapes, substeps, slice_length, tid / size, tid % size, size)
     else:
         search_for_others(s, topo, sizes, run, tid / size - s.worlds, tid % size, size)
 
@@ -224,7 +232,23 @@ def run_blocks_many(
 ):
     """The same where worlds queue up: with fewer registers a thread, so that more blocks share a multiprocessor."""
     tid = wp.tid()
-    advance_from_queue(s, topo, sizes, run, shapes, substeps, slice_length, tid / size, tid % size, size)
+    advance_whole(s, topo, sizes, run, shapes, substeps, slice_length, tid / size, tid % size, size)
+
+
+@wp.kernel(enable_backward=False, launch_bounds=(MANY_THREADS, MANY_AT_ONCE), module="nuno.plans.run_blocks_small")
+def run_blocks_small(
+    s: StateFloat,
+    topo: Topology,
+    sizes: Sizes,
+    run: Settings,
+    shapes: Shapes,
+    substeps: int,
+    size: int,
+    slice_length: int,
+):
+    """The same of small cloths, which leave more of a multiprocessor's memory to its cache."""
+    tid = wp.tid()
+    advance_small(s, topo, sizes, run, shapes, substeps, slice_length, tid / size, tid % size, size)
 
 
 @wp.kernel(enable_backward=False, launch_bounds=(FEW_THREADS, 1), module="nuno.plans.run_double_blocks")

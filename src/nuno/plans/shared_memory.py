@@ -17,22 +17,35 @@ ROOMY_PARTICLES, WHOLE_PARTICLES = wp.constant(SHARED_FLOATS // 7), wp.constant(
 """Particles of which three more numbers fit, and those for whose contacts there is room besides."""
 DOUBLE_PARTICLES = wp.constant(SHARED_FLOATS // 6)
 """Particles whose coordinates fit as doubles."""
+SMALL_FLOATS = SHARED_FLOATS // 2
+"""Floats in the buffer of small cloths; what blocks do not take of a multiprocessor's memory is its cache."""
+SMALL_PARTICLES = wp.constant(SMALL_FLOATS // 11)
+"""`WHOLE_PARTICLES` of a small cloth."""
 
 
-@wp.func_native("""
+_COLUMN = """
 #if defined(__CUDA_ARCH__)
-__shared__ float buffer[11500];
+__shared__ float buffer[FLOATS];
 return wp::array_t<wp::float32>(buffer + first, 0);
 #else
 return {};
 #endif
-""")
+"""
+
+
+@wp.func_native(_COLUMN.replace("FLOATS", str(SHARED_FLOATS)))
 def column(first: int) -> wp.array(dtype=float):  # type: ignore[valid-type]
     """The block's own memory from number ``first`` on.
 
     Known to the compiler as such, and by a place that it knows, an element is read by one short instruction. The array
     says that it has no elements, for then no index can be one that counts from the end.
     """
+    ...
+
+
+@wp.func_native(_COLUMN.replace("FLOATS", str(SMALL_FLOATS)))
+def small_column(first: int) -> wp.array(dtype=float):  # type: ignore[valid-type]
+    """The same of small cloths, in kernels that have no other."""
     ...
 
 

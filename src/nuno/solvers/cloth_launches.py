@@ -21,6 +21,7 @@ from nuno.plans.block_plan import (
     run_blocks_many,
     run_blocks_partly,
     run_blocks_shared,
+    run_blocks_small,
     run_double_blocks,
     run_double_blocks_partly,
 )
@@ -37,7 +38,7 @@ from nuno.plans.group_figures import SHARED_FIGURES
 from nuno.plans.group_kernels import THREADS, run_double_grid, run_grid
 from nuno.plans.group_plan import GridPlan, block_groups_of, cores_of
 from nuno.plans.recorded_launches import RecordedLaunches
-from nuno.plans.shared_memory import DOUBLE_PARTICLES, SHARED_PARTICLES, WHOLE_PARTICLES
+from nuno.plans.shared_memory import DOUBLE_PARTICLES, SHARED_PARTICLES, SMALL_PARTICLES, WHOLE_PARTICLES
 from nuno.plans.simd_elements import pack_topology
 from nuno.plans.stage_kernels import divide, make_work
 from nuno.solvers.particle_solver import ParticleSolver
@@ -110,7 +111,7 @@ class ClothLaunches(ParticleSolver):
         kernel = self._block_kernel(doubles is not None)
         states = [state] if doubles is None else [doubles, state]
         cores = cores_of(self.device)
-        slices = kernel in (run_blocks_shared, run_blocks_many)
+        slices = kernel in (run_blocks_shared, run_blocks_many, run_blocks_small)
         few = kernel is run_blocks_shared if slices else blocks <= cores
         threads = FEW_THREADS if few else MANY_THREADS
         inputs = [*states, self.device_topology, self._size, run, self.shapes, substeps, threads]
@@ -133,8 +134,9 @@ class ClothLaunches(ParticleSolver):
         if doubles:
             return run_double_blocks_partly if n <= DOUBLE_PARTICLES else run_double_blocks
         if n <= WHOLE_PARTICLES:
-            few = self.world_count <= FEW_WORLDS * cores_of(self.device)
-            return run_blocks_shared if few else run_blocks_many
+            if self.world_count <= FEW_WORLDS * cores_of(self.device):
+                return run_blocks_shared
+            return run_blocks_small if n <= SMALL_PARTICLES else run_blocks_many
         return run_blocks_partly if n <= SHARED_PARTICLES else run_blocks
 
     def _block_group_pays(self) -> bool:
