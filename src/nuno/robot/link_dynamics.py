@@ -149,6 +149,10 @@ class LinkDynamics:
         for body in self.links.bodies:
             if body.is_dynamic:
                 self.world.detach(body)
+        self.forget()
+
+    def forget(self) -> None:
+        """Take it that the links have no dynamics any more."""
         self.joints = self.fingers.joints = ()
 
     def drive(

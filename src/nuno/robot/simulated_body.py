@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.errors import BodyStateError, InvalidInputError
+from nuno.robot.link_posture import posture_of
 from nuno.robot.simulated_senses import SimulatedSenses
 from nuno.robot.trajectory_controller import ARRIVED
 from nuno.validation import checked
@@ -48,6 +49,7 @@ class SimulatedBody(SimulatedSenses):
     _motion: WantedMotion
     guard: MotionGuard
     _burden: Burden
+    _entered: bool
 
     @property
     def is_dynamic(self) -> bool:
@@ -65,6 +67,40 @@ class SimulatedBody(SimulatedSenses):
         with self.world.lock:
             self.guard.mode = mode
             self._look_anew()
+
+    def leave(self) -> None:
+        """End the simulation of the robot; links that it brought along leave the world.
+
+        Raises:
+            BodyStateError: it has left already.
+        """
+        with self.world.lock:
+            self._check_there()
+            self.cancel_angle_vector()
+            self.cancel_base()
+            self.world.drivers.remove(self)
+            if self.is_dynamic:
+                self.detach()
+            if self._entered:
+                self.links.leave()
+
+    def restored(self) -> None:
+        """Be at rest where the links are: the world was restored from what does not say how the robot moves."""
+        with self.world.lock:
+            if self.links.missing:
+                return  # of before it entered, say; that is told when it is to move
+            moving = [body for body in self.links.bodies if body.is_dynamic]
+            if self.balance is not None and self.is_dynamic and not moving:
+                self.balance.dynamics.forget()
+                self._arrive_within(ARRIVED)
+            for body in () if self.is_dynamic else moving:
+                self.world.detach(body)
+            self._start_from(posture_of(self.links))
+
+    def _check_there(self) -> None:
+        """Refuse what would wait for ever: after ``leave`` no frame of the world moves the robot."""
+        if self not in self.world.drivers:
+            raise BodyStateError(f"{self.actual.name!r} has left the world; SimulatedRobot(robot, world) enters anew")
 
     def attach(self) -> None:
         """Give the links dynamics from where they are, at rest: masses, motors, contact and balance.
