@@ -78,7 +78,7 @@ class SimulatedBody(SimulatedSenses):
             self._check_there()
             self.cancel_angle_vector()
             self.cancel_base()
-            self.world.drivers.remove(self)
+            self.world.drivers.remove(self)  # type: ignore[arg-type]  # a SimulatedRobot is one
             if self.is_dynamic:
                 self.detach()
             if self._entered:
