@@ -26,7 +26,7 @@ def posture_of(links: Links) -> np.ndarray:
     robot = links.robot
     model, kept = robot.model, robot.angle_vector()
     placed = _joints_placed(links)
-    told = list(placed)
+    measured = list(placed)
     base = placed.setdefault(1, robot.data.oMi[1].copy())
     angles = kept.copy()
     for joint in range(2, model.njoints):
@@ -43,7 +43,7 @@ def posture_of(links: Links) -> np.ndarray:
             angle += 2.0 * np.pi * np.round((kept[row] - angle) / (2.0 * np.pi))
         angles[row] = angle
     q = robot.configuration_of(angles, pin.SE3ToXYZQUAT(base))
-    return _refined(model, q, {joint: placed[joint] for joint in told})
+    return _refined(model, q, {joint: placed[joint] for joint in measured})
 
 
 def _refined(model: Any, q: np.ndarray, wanted: dict[int, Any]) -> np.ndarray:

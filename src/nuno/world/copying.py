@@ -64,13 +64,13 @@ class Copying(Running):
         if not isinstance(snapshot, Snapshot):
             raise InvalidInputError(f"restore needs what save returned, or a path, got {type(saved).__name__}")
         with self._change("restore"):
-            told = [driver for driver, _ in snapshot.drivers]
-            untold = [driver for driver in self.drivers if driver not in told]
-            for driver in untold:
+            recorded = [driver for driver, _ in snapshot.drivers]
+            unrecorded = [driver for driver in self.drivers if driver not in recorded]
+            for driver in unrecorded:
                 if hasattr(driver, "original"):
                     raise BodyStateError(f"the snapshot does not say how {driver!r} moves; imagine such a batch anew")
             apply(snapshot, self)
-            for driver in untold:
+            for driver in unrecorded:
                 if (restored := getattr(driver, "restored", None)) is not None:
                     restored()
 
