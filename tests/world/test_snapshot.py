@@ -265,6 +265,23 @@ def test_a_file_finds_a_mesh_that_was_looked_at(tmp_path):
     assert other.bodies == (block,)
 
 
+def test_a_file_finds_a_compound_with_parts_of_triangles(tmp_path):
+    """Parts with arrays, also such as have kept a hull of theirs since: the program's own body is the one in the file."""
+
+    def tray():
+        block = nuno.mesh(nuno.box((1, 1, 1)).surface()).shape
+        return nuno.compound([block, (block, (2, 0, 0))], name="tray", position=(0, 0, 2))
+
+    world, other = nuno.World(device="cpu"), nuno.World(device="cpu")
+    world.attach(world.add(tray()), nuno.Rigid(mass=1.0))
+    world.run(0.05)
+    world.save(tmp_path / "room.npz")
+    own = other.add(tray())
+    other.restore(tmp_path / "room.npz")
+    assert other.bodies == (own,) and own.is_dynamic
+    np.testing.assert_array_equal(own.vertices, world.bodies[0].vertices)
+
+
 def test_a_file_with_rules_for_a_body_that_was_removed(tmp_path):
     """It raised KeyError when it was read; the rules hold again when the body comes back."""
     world = nuno.World(device="cpu")
