@@ -90,12 +90,20 @@ class SimulatedBody(SimulatedSenses):
             if self.links.missing:
                 return  # of before it entered, say; that is told when it is to move
             moving = [body for body in self.links.bodies if body.is_dynamic]
-            if self.balance is not None and self.is_dynamic and not moving:
-                self.balance.dynamics.forget()
+            dynamics = None if self.balance is None else self.balance.dynamics
+            joints = () if dynamics is None else dynamics.joints
+            kept = bool(joints and moving) and all(joint.active for joint in joints)
+            if not kept:  # links that stood, or moved by the joints of another process
+                for body in moving:
+                    self.world.detach(body)
+                if dynamics is not None:
+                    dynamics.forget()
                 self._arrive_within(ARRIVED)
-            for body in () if self.is_dynamic else moving:
-                self.world.detach(body)
             self._start_from(posture_of(self.links))
+            for hand in self.hands.values():
+                hand.take_over()
+            if joints and moving and not kept:
+                self.attach()
 
     def _check_there(self) -> None:
         """Refuse what would wait for ever: after ``leave`` no frame of the world moves the robot."""
