@@ -266,7 +266,7 @@ def test_a_file_finds_a_mesh_that_was_looked_at(tmp_path):
 
 
 def test_a_file_finds_a_compound_with_parts_of_triangles(tmp_path):
-    """Parts with arrays, also such as have kept a hull of theirs since: the program's own body is the one in the file."""
+    """Parts with arrays, also such as have kept their hull since: the program's own body is the one in the file."""
 
     def tray():
         block = nuno.mesh(nuno.box((1, 1, 1)).surface()).shape
