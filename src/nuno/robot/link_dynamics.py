@@ -311,6 +311,17 @@ class LinkDynamics:
         made.fingers = self.fingers.imagined(world, made.bodies, keys)
         return made
 
+    def take(self, copies: LinkDynamics | None) -> None:
+        """Have the joints of copies, whose world its own has become one of; None for copies without dynamics.
+
+        They are others where the links were detached and attached since.
+        """
+        self.forget()
+        if copies is not None:
+            keys: dict[str, Any] = {grip.key: grip for grip in _grips_of(self.bodies)}
+            self.joints = tuple(keys[joint.key] for joint in copies.joints)
+            self.fingers.joints = tuple(keys[joint.key] for joint in copies.fingers.joints)
+
     def save(self) -> tuple[Any, ...]:
         """Return its joints and how hard its fingers press, for ``load``."""
         fingers = self.fingers

@@ -98,7 +98,7 @@ class SimulatedBody(SimulatedSenses):
                     self.world.detach(body)
                 if dynamics is not None:
                     dynamics.forget()
-                self._arrive_within(ARRIVED)
+                self._set_tolerance()
             self._start_from(posture_of(self.links))
             for hand in self.hands.values():
                 hand.take_over()
@@ -126,7 +126,7 @@ class SimulatedBody(SimulatedSenses):
             self.balance.dynamics.attach()
             for gripper in self.grippers.values():
                 gripper.close_again()
-            self._arrive_within(np.inf)  # as on robots with motors, goals without tolerances end with their time
+            self._set_tolerance()
 
     def detach(self) -> None:
         """Take the dynamics away: the robot stands still in its posture, and goes exactly where it is sent from now on.
@@ -141,7 +141,7 @@ class SimulatedBody(SimulatedSenses):
             self.balance.dynamics.detach()
             for name, bodies in pressed.items():  # what fingers pressed on is gripped from now on
                 self.hands[name].close([body for body in bodies if body.is_dynamic])
-            self._arrive_within(ARRIVED)
+            self._set_tolerance()
             self._start_from(self.actual.configuration())
 
     @checked
@@ -163,9 +163,10 @@ class SimulatedBody(SimulatedSenses):
             if was_dynamic:
                 self.attach()
 
-    def _arrive_within(self, near: float) -> None:
+    def _set_tolerance(self) -> None:
+        """Let goals without tolerances end with their time where motors move the joints, as on robots with motors."""
         for controller in self.joints.controllers.values():
-            controller.near = near
+            controller.near = np.inf if self.is_dynamic else ARRIVED
 
     def _start_from(self, q: np.ndarray) -> None:
         self._motion.start_from(q, self.world.time)

@@ -355,6 +355,7 @@ class SimulatedRobot(SimulatedBody):
         self._motion.load(motion)
         if self.balance is not None:
             self.balance.dynamics.load(joints)
+        self._set_tolerance()
         if self.actual is not self.wanted:
             self.actual.move_to(self.actual.angles_of(self._state.q), self._state.q[:7])
         for name, gripper in self.grippers.items():
@@ -377,6 +378,9 @@ class SimulatedRobot(SimulatedBody):
         """Go on as the copy in one world of a batch does, which the robot's world has just become."""
         for other in futures.drivers:
             if getattr(other, "original", None) is self:
+                if self.balance is not None:
+                    copies = other.balance  # type: ignore[attr-defined]
+                    self.balance.dynamics.take(None if copies is None else copies.dynamics)
                 joints = () if self.balance is None else self.balance.dynamics.save()
                 state, motion, servo, guard = other.saved_of(k)  # type: ignore[attr-defined]
                 grippers = {name: gripper.save() for name, gripper in self.grippers.items()}
