@@ -170,6 +170,7 @@ NONSENSE = {
     "two empty masks": lambda s: nuno.similarity(np.zeros((8, 8), bool), np.zeros((8, 8), bool)),
     "probabilities": lambda s: nuno.similarity(np.full((8, 8), 0.1), np.ones((8, 8), bool)),
     "one vertex twice": lambda s: s.world.grip("towel", [1, 1], to=(0, 0, 1)),
+    "no vertex": lambda s: s.world.grip("towel", [-1], to=(0, 0, 1)),
     "a vertex that is not there": lambda s: s.world.grip("towel", [99], to=(0, 0, 1)),
     "a body of a body": lambda s: nuno.compound([nuno.box((1, 1, 1))]),
     "parts of nothing": lambda s: nuno.compound(None),

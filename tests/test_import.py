@@ -50,3 +50,10 @@ def test_no_public_name_is_taken_by_a_module():
         if module.name in nuno.__all__:
             import_module(f"nuno.{module.name}")
             assert not isinstance(getattr(nuno, module.name), ModuleType)
+
+
+def test_packages_are_reached_by_their_names():
+    """docs/learning.md says ``nuno.envs``: it is there after ``import nuno``; what is no package is not."""
+    code = "import nuno; print(nuno.envs.__name__, hasattr(nuno, 'nothing'), hasattr(nuno, '_repr_html_'))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["nuno.envs", "False", "False"]

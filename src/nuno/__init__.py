@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from importlib import import_module
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 from nuno.bodies.body import Body
@@ -283,6 +284,8 @@ def __getattr__(name: str) -> Any:
         value = getattr(import_module(_LAZY[name]), name)
         globals()[name] = value
         return value
+    if not name.startswith("_") and find_spec(f"nuno.{name}") is not None:  # a package such as nuno.envs
+        return import_module(f"nuno.{name}")
     raise AttributeError(f"module 'nuno' has no attribute {name!r}")
 
 

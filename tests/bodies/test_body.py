@@ -1,5 +1,7 @@
 """Bodies: shapes, meshes, poses, points on surfaces."""
 
+import copy
+
 import numpy as np
 import pytest
 import trimesh
@@ -171,3 +173,16 @@ def test_default_colours_tell_kinds_apart():
     assert apart.min() > 0.25, "of 1.73 between black and white"
     assert nuno.sphere(1.0).color == nuno.box((1, 1, 1)).color == "gray"
     assert nuno.sheet((1, 1), cells=(2, 2), color="red").color == "red"
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy])
+def test_a_copy_is_another_body(copied):
+    """It stands in the same world beside the first and moves by itself; bodies that are in a world are not copied."""
+    world = nuno.World(device="cpu")
+    cup = nuno.box((0.1, 0.1, 0.1), name="cup")
+    other = copied(cup).locate((1.0, 0.0, 0.0))
+    world.add(cup)
+    assert world.add(other).name == "cup_1" and tuple(cup.position) == (0.0, 0.0, 0.0)
+    assert world.find("cup") is cup and world.find("cup_1") is other
+    with pytest.raises(nuno.BodyStateError, match="copy"):
+        copied(cup)

@@ -27,3 +27,10 @@ def test_bools_are_taken_as_they_are_and_black_has_no_foreground():
     assert not check_mask(np.zeros((2, 4)), CAMERA).any()
     with pytest.raises(ImageError, match="mask must have shape"):
         check_mask(INSIDE.T, CAMERA)
+
+
+@pytest.mark.parametrize("values", [(0.0, 0.02), (-3.0, 1.0), (0.0, 0.97), (0.0, np.nan)])
+def test_probabilities_and_logits_are_no_masks(values):
+    """Half of the largest means nothing for them: noise of 0.02 where there is no cloth would be cloth."""
+    with pytest.raises(ImageError, match="real numbers"):
+        check_mask(np.where(INSIDE, values[1], values[0]), CAMERA)

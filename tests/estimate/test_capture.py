@@ -188,9 +188,10 @@ def test_the_command_without_a_camera(tmp_path, capsys):
 
 def test_the_command_prints_a_board(tmp_path, capsys):
     """``nuno capture --board`` writes the board, and says to measure a square of it."""
-    assert main(["capture", "--board", str(tmp_path / "board.png"), "--paper", "letter"]) == 0
+    board = tmp_path / "out" / "board.png"  # in a folder that is not there yet
+    assert main(["capture", "--board", str(board), "--paper", "letter"]) == 0
     assert "measure" in capsys.readouterr().out
-    assert len(BOARD.find(nuno.camera.image.read_image(tmp_path / "board.png"))[0]) == 24
+    assert len(BOARD.find(nuno.camera.image.read_image(board))[0]) == 24
 
 
 @pytest.mark.long

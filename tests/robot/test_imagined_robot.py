@@ -172,3 +172,26 @@ def test_what_the_hands_hold_is_held_alike_in_every_world():
     world.run(0.2)
     for state in (*futures.robot.state(), robot.state()):
         assert np.array_equal(state.q, once.q) and np.array_equal(state.v, once.v)
+
+
+@pytest.mark.long
+def test_a_robot_is_what_the_adopted_or_restored_one_was(standing):
+    """With dynamics or without, whatever was detached and attached since; its motions end by its own tolerances."""
+    world, robot = standing
+    saved, moving = world.save(), world.imagine(1)
+    robot.detach()
+    still = world.imagine(1)
+    robot.attach()  # by other joints
+    world.adopt(moving, 0)
+    robot.sleep(0.1)
+    assert robot.is_dynamic and robot.state().fallen is None
+    world.adopt(still, 0)
+    assert not robot.is_dynamic and not any(body.is_dynamic for body in robot.links.bodies)
+    robot.sleep(0.1)
+    world.adopt(moving, 0)
+    assert robot.is_dynamic
+    robot.detach()
+    world.restore(saved)
+    robot.angle_vector({"arm_left_4_joint": -1.0}, 0.3)
+    robot.sleep(0.5)
+    assert not robot.is_interpolating()  # motors are not 1 mrad near; it waited for that

@@ -1,6 +1,8 @@
 """Running in the background: real time, changes between frames, errors that come back."""
 
 import gc
+import os
+import select
 import threading
 import time
 import weakref
@@ -155,3 +157,35 @@ def test_a_dropped_world_ends_its_thread():
         gc.collect()
         time.sleep(0.02)
     assert not thread.is_alive() and reference() is None
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
+@pytest.mark.parametrize("in_a_frame", [False, True])
+def test_a_forked_process_is_told_that_no_frames_come(in_a_frame):
+    """Its thread exists in the parent alone; so may the one that held the lock, in the midst of a frame."""
+    world, _ = room()
+    world.start(real_time_factor=0.01)
+    reads, writes = os.pipe()
+    holder = threading.Event()
+
+    def hold():
+        with world.lock:
+            holder.set()
+            time.sleep(1.0)
+
+    if in_a_frame:
+        threading.Thread(target=hold, daemon=True).start()
+        holder.wait()
+    child = os.fork()
+    if child == 0:
+        try:
+            world.run(0.1)
+        except BodyStateError as error:
+            os.write(writes, str(error).encode())
+        os._exit(0)
+    told = select.select([reads], [], [], 10.0)[0]
+    if not told:
+        os.kill(child, 9)
+    os.waitpid(child, 0)
+    world.stop()
+    assert told and b"forked" in os.read(reads, 200)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 import uuid
 from contextlib import AbstractContextManager, nullcontext
-from copy import copy
 from typing import TYPE_CHECKING, Any, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.bodies.body_facts import body_facts, millimetres
+from nuno.bodies.checked_values import ALL_GROUPS, checked_friction, checked_mask
 from nuno.bodies.quantities import Quantities
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.files.html_table import html_table
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from nuno.bodies.resolution import Resolution
 
 Color = str | tuple[float, float, float]
-ALL_GROUPS = 0xFFFFFFFF
 CLOTH_COLOR, SOFT_COLOR, PLANE_COLOR = "#4a86c8", "#e0a33c", "#c8c4bc"
 
 
@@ -82,9 +81,9 @@ class Body(Quantities, Coordinates):
         self._path: Path | None = None  # that the static body follows, whose pose is always that of the world's time
         # Vertices (worlds, n, 3) of a static body that dynamics have deformed, and the pose they belong to.
         self._deformed: tuple[np.ndarray, Pose] | None = None
-        self._friction = _checked_friction(friction)
+        self._friction = checked_friction(friction)
         self._thickness = float(Cloth.thickness) if shape.is_cloth else 0.0
-        self._group, self._collides_with = _mask("group", group), _mask("collides_with", collides_with)
+        self._group, self._collides_with = checked_mask("group", group), checked_mask("collides_with", collides_with)
         self.color = _default_color(shape) if color is None else color
 
     def __repr__(self) -> str:
@@ -92,6 +91,20 @@ class Body(Quantities, Coordinates):
         place = np.asarray(self.position)
         where = f"at {millimetres(place)} m" if place.ndim == 1 else f"in {len(place)} worlds"
         return f"<{self._shape.kind} {self._name!r} {where}, {state}>"
+
+    def __copy__(self, memo: Any = None) -> Body:
+        """Return another body of the same shape, for a world of its own or the same one.
+
+        Raises:
+            BodyStateError: it is in a world, or moves with another frame.
+        """
+        if self._world is not None or self._parent is not None:
+            raise BodyStateError(f"{self._name!r} is in a world or follows a frame: copy it before, or make another")
+        copied = self._as_static()
+        copied.__dict__.update(key=uuid.uuid4().hex, _children=[])
+        return copied
+
+    __deepcopy__ = __copy__  # shapes are never written to
 
     def _repr_html_(self) -> str:
         return html_table(f"Body {self._name!r}", body_facts(self))
@@ -163,7 +176,7 @@ class Body(Quantities, Coordinates):
 
     @friction.setter
     def friction(self, value: Any) -> None:
-        self._change("_friction", _checked_friction(value))
+        self._change("_friction", checked_friction(value))
 
     @property
     def group(self) -> int:
@@ -172,7 +185,7 @@ class Body(Quantities, Coordinates):
 
     @group.setter
     def group(self, value: int) -> None:
-        self._change("_group", _mask("group", value))
+        self._change("_group", checked_mask("group", value))
 
     @property
     def collides_with(self) -> int:
@@ -181,7 +194,7 @@ class Body(Quantities, Coordinates):
 
     @collides_with.setter
     def collides_with(self, value: int) -> None:
-        self._change("_collides_with", _mask("collides_with", value))
+        self._change("_collides_with", checked_mask("collides_with", value))
 
     @property
     def faces(self) -> np.ndarray:
@@ -354,7 +367,8 @@ class Body(Quantities, Coordinates):
 
     def _as_static(self) -> Body:
         """Return a copy that is static in the present place and shape; this body stays what it is."""
-        copied = copy(self)
+        copied = object.__new__(type(self))
+        copied.__dict__.update(self.__dict__)
         if copied._dynamics is not None:
             copied._thickness = self.thickness
             copied._freeze()
@@ -384,16 +398,3 @@ def _default_color(shape: Shape) -> Color:
 def _centre(vertices: np.ndarray) -> np.ndarray:
     centre = vertices.mean(axis=-2)
     return centre[0] if centre.ndim == 2 and len(centre) == 1 else centre
-
-
-def _checked_friction(value: Any) -> Any:
-    friction = finite_array("friction", value, (), ("worlds",))
-    if (friction < 0.0).any():
-        raise InvalidInputError(f"friction must be at least 0, got {value!r}")
-    return float(friction) if friction.ndim == 0 else friction
-
-
-def _mask(name: str, value: Any) -> int:
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 0 <= value <= ALL_GROUPS:
-        raise InvalidInputError(f"{name} must be a bit mask from 0 to {ALL_GROUPS:#x}, got {value!r}")
-    return int(value)

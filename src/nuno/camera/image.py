@@ -87,12 +87,12 @@ def check_mask(mask: ArrayLike, camera: Camera, name: str = "mask") -> np.ndarra
 
     Args:
         mask: (h, w) bool, or numbers of which those over half of the largest count as set (0 and 255 in
-            files).
+            files); the largest real number is 1 or 255.
         camera: The camera whose image it masks.
         name: What to call it in a message.
 
     Raises:
-        ImageError: it is of another shape.
+        ImageError: it is of another shape, or of real numbers of another range.
     """
     array = as_array(name, mask, ImageError)
     expected = (camera.height, camera.width)
@@ -102,4 +102,9 @@ def check_mask(mask: ArrayLike, camera: Camera, name: str = "mask") -> np.ndarra
         raise ImageError(f"{name} must be bool or numbers, got {array.dtype}")
     if array.dtype == bool:
         return array
+    if array.dtype.kind == "f" and not (array.min() >= 0.0 and array.max() in (0.0, 1.0, 255.0)):
+        raise ImageError(
+            f"{name} has real numbers from {array.min():.3g} to {array.max():.3g}, not from 0 to 1 or 255: of "
+            f"probabilities or what a network gives, pass {name} > 0.5, say"
+        )
     return array > 0.5 * max(float(array.max()), 1e-9)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from contextlib import suppress
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
@@ -71,6 +72,8 @@ def run_capture(options: argparse.Namespace) -> str:
         check_out_folder(options.out)
     board = CalibrationBoard(options.squares[0], options.squares[1], options.square)
     if options.board is not None:
+        with suppress(OSError):  # a folder that cannot be made is told by what writes into it
+            FilePath(options.board).parent.mkdir(parents=True, exist_ok=True)
         board.save(options.board, options.paper)
         return (
             f"see {options.board}: print it at 100 %, glue it onto something flat, and measure a square, which should "

@@ -122,7 +122,7 @@ class Grip:
 
         (3,) each, in a batch (worlds, 3); the torque is about the mean of the held points, or the origin of the held
         rigid body. A held towel at rest gives its weight, downwards. Of a weld, what ``body`` does to the other. The
-        mean over the last frame; zero before the first.
+        mean over the last frame; zero before the first, also after ``restore`` and ``adopt``.
 
         Raises:
             BodyStateError: the grip was released.

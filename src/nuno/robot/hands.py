@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nuno.bodies.body import Body
+from nuno.dynamics.dynamics import dynamics_of
 from nuno.errors import InvalidInputError, UnknownNameError
 from nuno.joints.grip import Grip
+from nuno.joints.joint import Joint
 from nuno.materials import Rigid
 from nuno.robot.closing_gap import closing_gap
 from nuno.robot.description import HandOnFrame
@@ -180,6 +182,12 @@ class Hand:
         for grip in self._grips:
             grip.release()
         self._grips = []
+
+    def take_over(self) -> None:
+        """Hold what is gripped to the hand's link, as a file has it that the world was restored from."""
+        grips = [grip for body in self.links.world.bodies if (own := dynamics_of(body)) for grip in own.grips]
+        tied = [grip for grip in grips if grip.target is self.body and not isinstance(grip, Joint)]
+        self._grips = [*self.grips, *(grip for grip in tied if grip not in self._grips)]
 
     @checked
     def move(self, width: float) -> dict[str, float]:

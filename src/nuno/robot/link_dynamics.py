@@ -149,6 +149,10 @@ class LinkDynamics:
         for body in self.links.bodies:
             if body.is_dynamic:
                 self.world.detach(body)
+        self.forget()
+
+    def forget(self) -> None:
+        """Take it that the links have no dynamics any more."""
         self.joints = self.fingers.joints = ()
 
     def drive(
@@ -306,6 +310,17 @@ class LinkDynamics:
         made.joints = tuple(keys[joint.key] for joint in self.joints)
         made.fingers = self.fingers.imagined(world, made.bodies, keys)
         return made
+
+    def take(self, copies: LinkDynamics | None) -> None:
+        """Have the joints of copies, whose world its own has become one of; None for copies without dynamics.
+
+        They are others where the links were detached and attached since.
+        """
+        self.forget()
+        if copies is not None:
+            keys: dict[str, Any] = {grip.key: grip for grip in _grips_of(self.bodies)}
+            self.joints = tuple(keys[joint.key] for joint in copies.joints)
+            self.fingers.joints = tuple(keys[joint.key] for joint in copies.fingers.joints)
 
     def save(self) -> tuple[Any, ...]:
         """Return its joints and how hard its fingers press, for ``load``."""

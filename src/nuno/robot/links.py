@@ -162,19 +162,27 @@ class Links:
         Raises:
             BodyStateError: they have left it already.
         """
-        self._check_inside()
+        if not self._inside:
+            self._check_inside()
         with self.world.lock:
             for body in self.bodies:
                 if body._world is self.world:
                     self.world.remove(body)
         self._inside = False
 
+    @property
+    def missing(self) -> list[str]:
+        """Names of those that are not in the world any more."""
+        return [body.name for body in self.bodies if body._world is not self.world]
+
     def _check_inside(self) -> None:
         if not self._inside:
             raise BodyStateError(f"the links of {self.robot.name!r} have left the world")
-        missing = [body.name for body in self.bodies if body._world is not self.world]
-        if missing:
-            raise BodyStateError(f"{len(missing)} links are no longer in the world, the first is {missing[0]!r}")
+        if missing := self.missing:
+            raise BodyStateError(
+                f"{len(missing)} links are no longer in the world, the first is {missing[0]!r}: add them, restore a "
+                "snapshot that has them, or let the robot leave"
+            )
 
 
 def _placed(axes: np.ndarray, origins: np.ndarray, offsets: np.ndarray) -> np.ndarray:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.errors import BodyStateError, InvalidInputError
+from nuno.robot.link_posture import posture_of
 from nuno.robot.simulated_senses import SimulatedSenses
 from nuno.robot.trajectory_controller import ARRIVED
 from nuno.validation import checked
@@ -48,6 +49,7 @@ class SimulatedBody(SimulatedSenses):
     _motion: WantedMotion
     guard: MotionGuard
     _burden: Burden
+    _entered: bool
 
     @property
     def is_dynamic(self) -> bool:
@@ -66,6 +68,48 @@ class SimulatedBody(SimulatedSenses):
             self.guard.mode = mode
             self._look_anew()
 
+    def leave(self) -> None:
+        """End the simulation of the robot; links that it brought along leave the world.
+
+        Raises:
+            BodyStateError: it has left already.
+        """
+        with self.world.lock:
+            self._check_there()
+            self.cancel_angle_vector()
+            self.cancel_base()
+            self.world.drivers.remove(self)  # type: ignore[arg-type]  # a SimulatedRobot is one
+            if self.is_dynamic:
+                self.detach()
+            if self._entered:
+                self.links.leave()
+
+    def restored(self) -> None:
+        """Be at rest where the links are: the world was restored from what does not say how the robot moves."""
+        with self.world.lock:
+            if self.links.missing:
+                return  # of before it entered, say; that is told when it is to move
+            moving = [body for body in self.links.bodies if body.is_dynamic]
+            dynamics = None if self.balance is None else self.balance.dynamics
+            joints = () if dynamics is None else dynamics.joints
+            kept = bool(joints and moving) and all(joint.active for joint in joints)
+            if not kept:  # links that stood, or moved by the joints of another process
+                for body in moving:
+                    self.world.detach(body)
+                if dynamics is not None:
+                    dynamics.forget()
+                self._set_tolerance()
+            self._start_from(posture_of(self.links))
+            for hand in self.hands.values():
+                hand.take_over()
+            if joints and moving and not kept:
+                self.attach()
+
+    def _check_there(self) -> None:
+        """Refuse what would wait for ever: after ``leave`` no frame of the world moves the robot."""
+        if self not in self.world.drivers:
+            raise BodyStateError(f"{self.actual.name!r} has left the world; SimulatedRobot(robot, world) enters anew")
+
     def attach(self) -> None:
         """Give the links dynamics from where they are, at rest: masses, motors, contact and balance.
 
@@ -82,7 +126,7 @@ class SimulatedBody(SimulatedSenses):
             self.balance.dynamics.attach()
             for gripper in self.grippers.values():
                 gripper.close_again()
-            self._arrive_within(np.inf)  # as on robots with motors, goals without tolerances end with their time
+            self._set_tolerance()
 
     def detach(self) -> None:
         """Take the dynamics away: the robot stands still in its posture, and goes exactly where it is sent from now on.
@@ -97,7 +141,7 @@ class SimulatedBody(SimulatedSenses):
             self.balance.dynamics.detach()
             for name, bodies in pressed.items():  # what fingers pressed on is gripped from now on
                 self.hands[name].close([body for body in bodies if body.is_dynamic])
-            self._arrive_within(ARRIVED)
+            self._set_tolerance()
             self._start_from(self.actual.configuration())
 
     @checked
@@ -119,9 +163,10 @@ class SimulatedBody(SimulatedSenses):
             if was_dynamic:
                 self.attach()
 
-    def _arrive_within(self, near: float) -> None:
+    def _set_tolerance(self) -> None:
+        """Let goals without tolerances end with their time where motors move the joints, as on robots with motors."""
         for controller in self.joints.controllers.values():
-            controller.near = near
+            controller.near = np.inf if self.is_dynamic else ARRIVED
 
     def _start_from(self, q: np.ndarray) -> None:
         self._motion.start_from(q, self.world.time)

@@ -121,23 +121,6 @@ class SimulatedRobot(SimulatedBody):
     def __repr__(self) -> str:
         return f"<SimulatedRobot {self.actual.name!r} at t = {self.now():.3f} s>"
 
-    def leave(self) -> None:
-        """End the simulation of the robot; links that it brought along leave the world.
-
-        Raises:
-            BodyStateError: it has left already.
-        """
-        with self.world.lock:
-            if self not in self.world.drivers:
-                raise BodyStateError(f"{self.actual.name!r} has left the world already")
-            self.cancel_angle_vector()
-            self.cancel_base()
-            self.world.drivers.remove(self)
-            if self.is_dynamic:
-                self.detach()
-            if self._entered:
-                self.links.leave()
-
     # What is true
 
     def state(self) -> RobotState:
@@ -167,6 +150,7 @@ class SimulatedRobot(SimulatedBody):
         return True
 
     def _let_pass(self, seconds: float) -> None:
+        self._check_there()
         if self.pace is None or self.world.is_running:
             self.world.run(seconds)
             return
@@ -199,6 +183,7 @@ class SimulatedRobot(SimulatedBody):
     ) -> Goal:
         """Send a trajectory to a controller, to start ``start_time`` [s] from now; see ``RobotInterface``."""
         with self.world.lock:
+            self._check_there()
             name = self._controller_name(controller)
             taken = "the robot walks" if self.gait.moves(name) else "its joints are under a servo command"
             if self.gait.moves(name) or self._servo_has(name):
@@ -264,6 +249,7 @@ class SimulatedRobot(SimulatedBody):
         """
         goal = Goal((x, y, yaw))
         with self.world.lock:
+            self._check_there()
             if self.gait.is_walking:
                 self.gait.change(goal, x, y, yaw, seconds)
                 return goal
@@ -286,6 +272,7 @@ class SimulatedRobot(SimulatedBody):
     def send_velocity(self, x: float, y: float, yaw: float, hold: float = 1.0) -> Goal:
         """Let the robot keep a velocity, the newest from each landing of a foot; see ``RobotInterface``."""
         with self.world.lock:
+            self._check_there()
             x, y, yaw = (number(name, value) for name, value in (("x", x), ("y", y), ("yaw", yaw)))
             return self.gait.drive(x, y, yaw, number("hold", hold, above=0.0))
 
@@ -303,6 +290,7 @@ class SimulatedRobot(SimulatedBody):
             UnknownNameError: the robot has no such hand.
         """
         with self.world.lock:
+            self._check_there()
             if hand not in self.grippers:
                 raise UnknownNameError("hand", hand, list(self.grippers))
             return self.grippers[hand].send(position, effort)
@@ -367,6 +355,7 @@ class SimulatedRobot(SimulatedBody):
         self._motion.load(motion)
         if self.balance is not None:
             self.balance.dynamics.load(joints)
+        self._set_tolerance()
         if self.actual is not self.wanted:
             self.actual.move_to(self.actual.angles_of(self._state.q), self._state.q[:7])
         for name, gripper in self.grippers.items():
@@ -389,6 +378,9 @@ class SimulatedRobot(SimulatedBody):
         """Go on as the copy in one world of a batch does, which the robot's world has just become."""
         for other in futures.drivers:
             if getattr(other, "original", None) is self:
+                if self.balance is not None:
+                    copies = other.balance  # type: ignore[attr-defined]
+                    self.balance.dynamics.take(None if copies is None else copies.dynamics)
                 joints = () if self.balance is None else self.balance.dynamics.save()
                 state, motion, servo, guard = other.saved_of(k)  # type: ignore[attr-defined]
                 grippers = {name: gripper.save() for name, gripper in self.grippers.items()}

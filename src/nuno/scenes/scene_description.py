@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from nuno.bodies.body import ALL_GROUPS
+from nuno.bodies.checked_values import ALL_GROUPS
 from nuno.joints.joint_drives import Motor, Spring
 from nuno.materials import Material
 from nuno.shapes.shape import Shape

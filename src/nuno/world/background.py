@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import threading
 import time
 import weakref
 from typing import Protocol
 
+from nuno.errors import BodyStateError
 from nuno.world.pace import LATE, Pace
 
 
@@ -40,6 +42,7 @@ class FrameLock:
         self._lock = threading.RLock()
         self._waiting = 0
         self._count = threading.Lock()
+        _locks.add(self)
 
     def __enter__(self) -> FrameLock:
         if not self._lock.acquire(blocking=False):
@@ -70,6 +73,25 @@ class FrameLock:
                 return
             time.sleep(0.0005)
 
+    def forked(self) -> None:
+        """Be free in a forked process, where the thread that held it does not exist."""
+        if self._lock.acquire(blocking=False):
+            self._lock.release()
+        else:
+            self._lock, self._waiting, self._count = threading.RLock(), 0, threading.Lock()
+
+
+_locks: weakref.WeakSet[FrameLock] = weakref.WeakSet()
+
+
+def _free_locks() -> None:
+    for lock in _locks:
+        lock.forked()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_free_locks)
+
 
 class Background:
     """The thread that makes a world's frames.
@@ -85,13 +107,20 @@ class Background:
         self.error: BaseException | None = None
         self._stop = threading.Event()
         self._frame = threading.Condition()
+        self._process = os.getpid()
         arguments = (weakref.ref(world), world.lock, world._pace, real_time_factor)
         self._thread = threading.Thread(target=self._loop, args=arguments, name="nuno-world", daemon=True)
         self._thread.start()
 
     @property
     def alive(self) -> bool:
-        """Return True if frames are still made."""
+        """Return True if frames are still made.
+
+        Raises:
+            BodyStateError: in a process forked from the one that makes them, where they never come.
+        """
+        if os.getpid() != self._process:
+            raise BodyStateError("the world ran in the background when this process was forked: stop it before that")
         return self._thread.is_alive() and not self._stop.is_set() and self.error is None
 
     @property

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -173,16 +173,14 @@ def _recorded_body(record: BodyRecord, snapshot: Snapshot, world: Simulation) ->
     return body
 
 
-def same_shape(a: Shape, b: Shape) -> bool:
-    """Return True if two shapes are equal, number for number."""
-    if type(a) is not type(b):
-        return False
-    if a == b:
-        return True
-    return all(
-        np.array_equal(x, y) if isinstance(x, np.ndarray) else x == y
-        for x, y in zip(a.__dict__.values(), b.__dict__.values(), strict=True)
-    )
+def same_shape(a: Any, b: Any) -> bool:
+    """Return True if two shapes are equal, number for number, part by part."""
+    if isinstance(a, Shape):
+        named: Any = fields(a)  # type: ignore[arg-type]  # every shape is a dataclass; what it caches is no field
+        return type(a) is type(b) and all(same_shape(getattr(a, own.name), getattr(b, own.name)) for own in named)
+    if isinstance(a, tuple):
+        return isinstance(b, tuple) and len(a) == len(b) and all(map(same_shape, a, b))
+    return np.array_equal(a, b) if isinstance(a, np.ndarray) else bool(a == b)
 
 
 def _dynamics_for(

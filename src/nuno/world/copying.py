@@ -49,9 +49,10 @@ class Copying(Running):
         """Make the world what it was. Bodies removed since come back, bodies added since go.
 
         Body and Grip objects keep their identity; a file of another process finds its bodies by name and
-        shape.
+        shape. A file says where a robot's links are and not how it moves: the robot is at rest there.
 
         Raises:
+            BodyStateError: a batch with imagined robots, and not what ``save`` of this batch returned.
             FileFormatError: the file cannot be read, or its format is unknown or newer.
             InvalidInputError: neither a snapshot nor a path.
         """
@@ -63,7 +64,15 @@ class Copying(Running):
         if not isinstance(snapshot, Snapshot):
             raise InvalidInputError(f"restore needs what save returned, or a path, got {type(saved).__name__}")
         with self._change("restore"):
+            recorded = [driver for driver, _ in snapshot.drivers]
+            unrecorded = [driver for driver in self.drivers if driver not in recorded]
+            for driver in unrecorded:
+                if hasattr(driver, "original"):
+                    raise BodyStateError(f"the snapshot does not say how {driver!r} moves; imagine such a batch anew")
             apply(snapshot, self)
+            for driver in unrecorded:
+                if (restored := getattr(driver, "restored", None)) is not None:
+                    restored()
 
     def reset(self, worlds: ArrayLike, saved: Snapshot) -> None:
         """Let some worlds of a batch become what was saved, and leave all others as they are, to the bit.

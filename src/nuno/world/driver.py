@@ -11,6 +11,9 @@ class Driver(Protocol):
     One that goes along into imagined worlds has besides ``imagined(futures, world)``, which returns the driver of its
     copies in a batch, and ``take_future(futures, k)``, by which it becomes its copy in world ``k`` of one.
 
+    One that can go on from where its bodies are has ``restored()``, which is called where the world was restored from
+    what ``save`` of it is not part of, such as a file.
+
     One that knows many frames ahead has ``frames_ahead(start, ends)``: how many of the frames that end at ``ends`` [s]
     it can be asked for at once, one at least. ``begin_frame`` may then be for so many of them, or fewer.
     """

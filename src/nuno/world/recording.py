@@ -274,7 +274,8 @@ class Recording:
             header = json.loads(str(arrays["header"][()]))
             made = (header["format"], header["version"])
         except UNREADABLE as error:
-            raise FileFormatError(f"cannot read {name!r} as a recording: {error}") from error
+            why = "it is no .npz file" if "allow_pickle" in str(error) else error  # numpy advises to load it unsafely
+            raise FileFormatError(f"cannot read {name!r} as a recording: {why}") from error
         if made != (FORMAT, VERSION):
             raise FileFormatError(
                 f"{name!r} is of the format {made[0]!r} {made[1]!r}; this version of nuno reads {FORMAT!r} {VERSION}"

@@ -89,7 +89,8 @@ def read_snapshot(path: str | os.PathLike[str]) -> Snapshot:
         AttributeError,
         zipfile.BadZipFile,
     ) as error:
-        raise FileFormatError(f"cannot read {os.fspath(path)!r} as a saved world: {error}") from error
+        why = "it is no .npz file" if "allow_pickle" in str(error) else error  # numpy advises to load it unsafely
+        raise FileFormatError(f"cannot read {os.fspath(path)!r} as a saved world: {why}") from error
     if version not in READABLE:
         raise FileFormatError(
             f"{os.fspath(path)!r} has the format {version!r}; this version of nuno reads formats 1 to {FORMAT}"
