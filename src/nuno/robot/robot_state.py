@@ -58,3 +58,12 @@ class RobotState:
         state = object.__new__(RobotState)  # the other fields' defaults are the class's
         state.__dict__.update(time=time, q=q, v=v, a=a, contacts={})
         return state
+
+    def judged(
+        self, over_torque: tuple[str, ...], unbalanced: Unbalance | None, collision: Collision | None
+    ) -> RobotState:
+        """Return the same state with what was found of it."""
+        state = object.__new__(RobotState)
+        state.__dict__.update(self.__dict__)
+        state.__dict__.update(over_torque=over_torque, unbalanced=unbalanced, collision=collision)
+        return state

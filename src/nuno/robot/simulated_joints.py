@@ -52,6 +52,7 @@ class SimulatedJoints:
         self.desired: Motion = (self.positions, self.velocities, self.accelerations)
         self._polynomials = with_derivatives(resting_at(self.positions))
         self._begin = np.zeros(count)
+        self._holds: bool | None = None  # whether those are constant; None is not known
         self.controllers: dict[str, TrajectoryController] = {}
         self.rows: dict[str, np.ndarray] = {}
         self._pending: tuple[float, Motion, Motion] | None = None
@@ -157,12 +158,23 @@ class SimulatedJoints:
             controllers = self.controllers.values()
             self._quiet = (self.commands, min((own.next_event for own in controllers), default=np.inf))
             self._busy = [(own, self.rows[name]) for name, own in self.controllers.items() if own.is_busy]
-        desired = evaluate(self._polynomials, time - self._begin)
-        actual = limited(desired, motion, duration, self.velocity_limits, self.limits)
+        desired = self._desired_at(time)
         if rows is not None and given is not None:
-            desired, actual = _with(desired, rows, given), _with(actual, rows, given)
+            desired = _with(desired, rows, given)
+        actual = limited(desired, motion, duration, self.velocity_limits, self.limits)
+        if actual is not desired and rows is not None and given is not None:
+            actual = _with(actual, rows, given)
         self._pending = (time, desired, actual)
-        return self._pending[2]
+        return actual
+
+    def _desired_at(self, time: float) -> Motion:
+        """Return what the controllers want at a time [s], (n,) each."""
+        if self._holds is None:
+            constant = self._polynomials[0, 0]
+            self._holds = bool(np.count_nonzero(self._polynomials) == np.count_nonzero(constant))
+        if self._holds:  # as the polynomials give it, to the bit
+            return self._polynomials[0, 0] + 0.0, np.zeros(len(self._begin)), np.zeros(len(self._begin))
+        return evaluate(self._polynomials, time - self._begin)
 
     def put(self, positions: np.ndarray) -> None:
         """Be at rest at positions (n,); controllers give up what they do, and hold."""
@@ -240,6 +252,7 @@ class SimulatedJoints:
         rows, piece = self.rows[name], self.controllers[name].piece
         self._polynomials[:, :, rows] = with_derivatives(piece.coefficients)
         self._begin[rows] = piece.start
+        self._holds = None
 
 
 def limited(desired: Motion, now: Motion, duration: float, speeds: np.ndarray, limits: Any) -> Motion:
