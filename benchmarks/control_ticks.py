@@ -2,10 +2,10 @@
 
     python benchmarks/control_ticks.py OTHER [--ticks 300] [--rounds 9] [--scenes rest arm ...] [--json FILE]
 
-OTHER is the src folder of another checkout (git worktree add ../other COMMIT). A tick is what the world asks of the robot
-in a frame (``begin_frame`` and ``end_frame``), without the frame, in processor time. Of each process the median and the
-mean of its ticks are taken: every thirtieth tick looks at torques and balance, which only the mean has. Nobody reads the
-robot's state or sensors. Of the processes their medians and their least.
+OTHER is the src folder of another checkout (git worktree add ../other COMMIT). A tick is what the world asks of the
+robot in a frame (``begin_frame`` and ``end_frame``), without the frame, in processor time. Of each process the median
+and the mean of its ticks are taken: every thirtieth tick looks at torques and balance, which only the mean has. Nobody
+reads the robot's state or sensors. Of the processes their medians and their least.
 """
 
 from __future__ import annotations

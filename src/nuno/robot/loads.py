@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.bodies.body import Body
-from nuno.dynamics.dynamics import ParticleDynamics
+from nuno.dynamics.dynamics import ParticleDynamics, dynamics_of
 from nuno.joints.held_points import held_points
 from nuno.materials import Cloth
 from nuno.robot.ground import moment
@@ -87,7 +87,7 @@ class LinkLoads:
         """Return all loads, those of the last frame."""
         world = self._world
         with world.lock:
-            moving: list[Any] = [body for body in world._bodies.values() if body.is_dynamic and body not in self._index]
+            moving = self._moving()
             now = (world.time, tuple(grip.key for body in moving for grip in body._dynamics.grips))
             if now != self._read_at:
                 self._loads = tuple(load for body in moving for load in self._of(body))
@@ -99,15 +99,18 @@ class LinkLoads:
         return self._loads
 
     def note(self) -> None:
-        """Take note of how bodies move now, for a reading in the next frame: most of what that would take now is spared."""
-        world = self._world
-        with world.lock:
+        """Take note of how bodies move now, for a reading in the next frame; what bears on links is not worked out."""
+        with self._world.lock:
             self._noted = {}
-            for body in world._bodies.values():
-                dynamics: Any = body._dynamics
-                if body not in self._index and isinstance(dynamics, ParticleDynamics) and _has_momentum(dynamics):
+            for body in self._moving():
+                dynamics = dynamics_of(body)
+                if isinstance(dynamics, ParticleDynamics) and _has_momentum(dynamics):
                     rows = self._rows_of(body, dynamics.solver)
-                    self._noted[body] = _motion_of(rows, dynamics.solver.mass[0], world.time)
+                    self._noted[body] = _motion_of(rows, dynamics.solver.mass[0], self._world.time)
+
+    def _moving(self) -> list[Any]:
+        """Return all bodies with dynamics but the links."""
+        return [body for body in self._world._bodies.values() if body.is_dynamic and body not in self._index]
 
     def _of(self, body: Body) -> list[Load]:
         dynamics: Any = body._dynamics

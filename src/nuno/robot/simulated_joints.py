@@ -58,7 +58,7 @@ class SimulatedJoints:
         self._pending: tuple[float, Motion, Motion] | None = None
         self._rested: tuple[Any, ...] = ()  # how they were when they were last found to rest
         self._quiet: tuple[int, float] = (-1, 0.0)  # commands, and the clock before which nothing comes of them
-        self._busy: list[tuple[TrajectoryController, np.ndarray]] = []  # and whose goals are told how it goes, until then
+        self._busy: list[tuple[TrajectoryController, np.ndarray]] = []  # whose goals are told how it goes until then
         taken: set[str] = set()
         for name, joints in groups.items():
             if taken & set(joints):
