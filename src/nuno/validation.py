@@ -49,7 +49,7 @@ def finite_array(name: str, value: Any, *shapes: Shape, error: type[Exception] =
         array = np.array(value)
         if array.dtype.kind not in "iufO":
             raise ValueError(f"{array.dtype} is no real number")
-        array = array.astype(np.float64)
+        array = array.astype(np.float64, copy=False)  # it is a copy already
     except (TypeError, ValueError, OverflowError) as problem:
         raise error(f"{name} must be numbers of shape {_shape_text(shapes)}, got {_short(value)}") from problem
     if not any(_fits(array.shape, shape) for shape in shapes):

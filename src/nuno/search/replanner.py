@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.errors import InvalidInputError
+from nuno.search.futures import Futures
 from nuno.search.knots import LONGEST, Knots
-from nuno.search.planner import Plan, called, plan
+from nuno.search.planner import Plan, called, plan_in
 from nuno.validation import checked, count, finite_array, flag, function, number
 from nuno.world.world import World
 
@@ -93,6 +94,7 @@ def replan(
     pause = number("every", every, above=0.0, high=span)
     rounds = count("periods", periods, high=10_000)
     shrinks, first = flag("shrink", shrink), count("seed", seed, low=0)
+    batch = Futures(world)
     plans: list[Plan] = []
     motions: list[Knots] = []
     took: list[float] = []
@@ -105,10 +107,10 @@ def replan(
             act(futures, Knots(here, values, span))
 
         begin = time.perf_counter()
-        found = plan(
-            world, imagined, cost, start=knots, spread=deviations * (span / whole), horizon=span, samples=samples,
-            iterations=iterations, method=method, elites=elites, temperature=temperature, bounds=bounds,
-            seed=first + k, device=device, thorough=thorough,
+        found = plan_in(
+            batch, world, imagined, cost, start=knots, spread=deviations * (span / whole), horizon=span,
+            samples=samples, iterations=iterations, method=method, elites=elites, temperature=temperature,
+            bounds=bounds, seed=first + k, device=device, thorough=thorough,
         )  # fmt: skip
         took.append(time.perf_counter() - begin)
         motion = Knots(here, found.knots, span)
