@@ -297,6 +297,8 @@ class ParticleDynamics(Dynamics):
 
     def load_state(self, state: State) -> None:
         """Set the state that `state` gave; what shapes gave before that was in another past."""
+        if self.grips_changed:  # others come before the next frame
+            self.solver.forget_grips()
         self.solver.load_state(state)
         self._forget_impulses()
 

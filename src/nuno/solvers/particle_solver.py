@@ -140,6 +140,10 @@ class ParticleSolver(ParticleState):
         self._scaled_grip_compliance: dict[float, wp.array] = {}
         self._forget_launches()
 
+    def forget_grips(self) -> None:
+        """Be told that other grips will be set before anything runs, so that a state is loaded without these."""
+        self._grips = ()
+
     def grip_forces(self) -> list[tuple[np.ndarray, np.ndarray]]:
         """Return what each point of each grip bore in the last frame, and the mass that it moves with.
 
