@@ -81,8 +81,8 @@ class Burden:
 
     def _look(self, state: RobotState) -> None:
         moves = bool(state.v.any() or state.a.any())
-        is_bound = moves or any(body.is_dynamic for body in self._links.world.bodies)
-        self._still = 0 if is_bound else self._still + 1
+        changes = moves or any(body.is_dynamic for body in self._links.world.bodies)
+        self._still = 0 if changes else self._still + 1
         prepares = self._frames < EVERY
         self._frames %= EVERY
         if self._still > 2 * ENOUGH:
