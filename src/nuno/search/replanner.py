@@ -77,8 +77,8 @@ def replan(
         bounds: Lowest and highest knots.
         seed: Of the samples; each period has its own.
         device: Where futures run.
-        thorough: As of ``plan``. Without, all plans imagine in one batch, which goes back to the world as it is then and
-            keeps its memory until the last.
+        thorough: As of ``plan``. Without, all plans imagine in one batch, which goes back to the world as it is then
+            and keeps its memory until the last.
 
     Raises:
         InvalidInputError: an argument out of range, or a function of the caller's fails.
