@@ -127,7 +127,7 @@ def test_bad_arguments_are_named():
 
 def test_futures_that_are_set_back_have_the_bits_of_new_ones(monkeypatch):
     """Plans, and what comes of them, of a cloth that a hand leads: the batch is imagined once, or anew each time."""
-    from nuno.search.futures import Futures
+    from nuno.search.planned_futures import PlannedFutures
 
     imagined, own = [], nuno.World.imagine
     monkeypatch.setattr(nuno.World, "imagine", lambda *given, **named: imagined.append(1) or own(*given, **named))
@@ -152,18 +152,18 @@ def test_futures_that_are_set_back_have_the_bits_of_new_ones(monkeypatch):
         def cost(futures):
             return np.linalg.norm(futures.find("cloth").vertices[:, 24] - (0.0, 0.0, 0.05), axis=1)
 
-        begin = Futures.begin
+        begin = PlannedFutures.begin
 
         def begin_anew(self, *given):
-            return begin(Futures(self._world), *given)
+            return begin(PlannedFutures(self._world), *given)
 
-        monkeypatch.setattr(Futures, "begin", begin_anew if anew else begin)
+        monkeypatch.setattr(PlannedFutures, "begin", begin_anew if anew else begin)
         imagined.clear()
         found = nuno.replan(
             world, act, cost, now=now, start=[(0.1, 0.1, 0.1), (0.0, 0.0, 0.05)], spread=0.05, horizon=0.2, every=0.1,
             periods=3, samples=4, iterations=2, bounds=(-0.3, 0.3), thorough=False,
         )  # fmt: skip
-        monkeypatch.setattr(Futures, "begin", begin)
+        monkeypatch.setattr(PlannedFutures, "begin", begin)
         return [plan.knots.tobytes() for plan in found.plans], cloth.vertices.tobytes(), len(imagined)
 
     plans, vertices, times = run(anew=False)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from nuno.world.world import World
 
 MESHES = ("collision", "visual", "joints")
-MOST_KINDS = 64
+KEPT_PARTS = 64
 """Of sets of joints that move together, for which is kept which bodies they move."""
 
 
@@ -165,7 +165,7 @@ class Links:
                     moved[k] = True
             which = np.flatnonzero(moved)
             part = self._part(which) if 2 * len(which) < len(moved) else self._all
-            if len(self._moved_with) >= MOST_KINDS:
+            if len(self._moved_with) >= KEPT_PARTS:
                 self._moved_with.clear()
             self._moved_with[kind] = part
         return part

@@ -83,7 +83,7 @@ class SimulatedJoints:
 
     @property
     def _still_rests(self) -> bool:
-        """Whether they rested when this was asked last, and are as they were: no array of theirs is ever written to."""
+        """Return True if they rested when asked last and are as they were: no array of theirs is ever written to."""
         rested = self._rested
         return (
             bool(rested) and rested[0] == self.commands and rested[1] is self.positions

@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 from nuno.dynamics.dynamics import ParticleDynamics
 from nuno.engines.world_view import attached
 from nuno.errors import EstimationError, InvalidInputError, NunoError
-from nuno.search.futures import Futures
 from nuno.search.knots import LONGEST
+from nuno.search.planned_futures import PlannedFutures
 from nuno.validation import checked, count, finite_array, function, number
 from nuno.world.impacts import fast_cloths, forget_fast
 from nuno.world.world import World
@@ -90,14 +90,14 @@ def plan(
         EstimationError: no future of the first iteration has a finite cost.
     """
     return plan_in(
-        Futures(world), world, act, cost, start=start, spread=spread, horizon=horizon, samples=samples,
+        PlannedFutures(world), world, act, cost, start=start, spread=spread, horizon=horizon, samples=samples,
         iterations=iterations, method=method, elites=elites, temperature=temperature, bounds=bounds, seed=seed,
         device=device, thorough=thorough,
     )  # fmt: skip
 
 
 def plan_in(
-    batch: Futures, world: World, act: Callable[[World, np.ndarray], Any], cost: Callable[[World], Any], *,
+    batch: PlannedFutures, world: World, act: Callable[[World, np.ndarray], Any], cost: Callable[[World], Any], *,
     start: ArrayLike, spread: ArrayLike, horizon: float, samples: int, iterations: int, method: str, elites: int | None,
     temperature: float, bounds: tuple[ArrayLike, ArrayLike] | None, seed: int, device: str | None, thorough: bool,
 ) -> Plan:  # fmt: skip

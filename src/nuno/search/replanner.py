@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.errors import InvalidInputError
-from nuno.search.futures import Futures
 from nuno.search.knots import LONGEST, Knots
+from nuno.search.planned_futures import PlannedFutures
 from nuno.search.planner import Plan, called, plan_in
 from nuno.validation import checked, count, finite_array, flag, function, number
 from nuno.world.world import World
@@ -95,7 +95,7 @@ def replan(
     pause = number("every", every, above=0.0, high=span)
     rounds = count("periods", periods, high=10_000)
     shrinks, first = flag("shrink", shrink), count("seed", seed, low=0)
-    batch = Futures(world)
+    batch = PlannedFutures(world)
     plans: list[Plan] = []
     motions: list[Knots] = []
     took: list[float] = []

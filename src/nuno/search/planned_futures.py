@@ -1,4 +1,4 @@
-"""Futures: the batch in which plans of a world are imagined, made by the first and set back by those that follow."""
+"""PlannedFutures: the batch in which plans of a world are imagined, made by the first and set back by the others."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from nuno.world.snapshot import Snapshot
 from nuno.world.world import World
 
 
-class Futures:
+class PlannedFutures:
     """The futures that plans of one world imagine, one plan after the other.
 
     Making a batch takes several times as long as setting it back, and the bits are the same. Copies of a robot have
