@@ -32,6 +32,19 @@ LIFTED = 5e-3
 """[m] Above the lowest corner of all soles, from where on a sole does not bear."""
 
 
+class StrainSensors(Sensors):
+    """Sensors that are asked for no more than what strains a robot without dynamics."""
+
+    def strain(self, state: RobotState) -> tuple[np.ndarray, np.ndarray | None]:
+        """Return of ``read`` torques (n,) [N m; N] and zero moment point (2,) [m], None where no foot stands.
+
+        Args:
+            state: How the robot moves, at the time that the world has now.
+        """
+        torques, _, point, _ = self._balance(state, None)
+        return torques, point
+
+
 class Burden:
     """Looks every ``EVERY`` frames whether the joints' torques and the balance are possible.
 
@@ -45,7 +58,7 @@ class Burden:
 
     def __init__(self, robot: Humanoid, links: Links) -> None:
         self._links, self._robot = links, robot
-        self._sensors = Sensors(robot, links)
+        self._sensors = StrainSensors(robot, links)
         limits = robot.effort_limits
         self._limits = np.where(np.isfinite(limits) & (limits > 0.0), limits, np.inf)
         frames = links.robot.description.frames

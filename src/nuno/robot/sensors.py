@@ -162,18 +162,6 @@ class Sensors:
         torques = torques if state.torques is None else state.torques
         return self._readings(state.time, self._all_read(state, torques, before, point, pressed))
 
-    def strain(self, state: RobotState) -> tuple[np.ndarray, np.ndarray | None]:
-        """Return what a state without dynamics asks of the robot: as ``read``, without all else that sensors tell.
-
-        Args:
-            state: How the robot moves, at the time that the world has now.
-
-        Returns:
-            Torques (n,) [N m; N] of the joints, and the zero moment point (2,) [m], None where no foot stands.
-        """
-        torques, _, point, _ = self._balance(state, None)
-        return torques, point
-
     @property
     def soles(self) -> np.ndarray | None:
         """The corners of the soles at the last reading, (feet, 4, 3) [m]; None without feet."""
