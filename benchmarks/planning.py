@@ -13,10 +13,11 @@ The second does so with Talos' arms in the place of points (benchmarks/arm_tasks
 robot. What the last plan of a seed cost in imagination stands beside what it cost as carried out. ``--rough`` imagines
 fast frames once (``thorough=False``), as hands that are points always do here.
 
-The third imagines futures of 1 s of a sheet of 20 x 20 cells that two hands fold, through ``nuno.plan`` with one
-iteration: rollouts a second, plans a second, and what of a plan is imagining the batch, setting it on its way,
-simulating and scoring, medians. The first plan of a row, which compiles kernels where that was not done, stands by
-itself. On CUDA ``nuno.plans.run_blocks_small`` (up to 158 rollouts ``run_blocks_shared``) takes long to compile.
+The third imagines futures of 1 s of a sheet of 20 x 20 cells that two hands fold, with one iteration: plan after plan
+by ``nuno.replan``, which sets its futures back, and by ``nuno.plan``, which imagines them anew. It tells rollouts a
+second, plans a second, and what of a plan is beginning with the batch, setting it on its way, simulating and scoring,
+medians. The first plan of a row, which compiles kernels where that was not done, stands by itself. On CUDA
+``nuno.plans.run_blocks_small`` (up to 158 rollouts ``run_blocks_shared``) takes long to compile.
 ``--thorough`` imagines with doubles, and fast frames twice.
 """
 
@@ -107,12 +108,18 @@ def measure_rate(rollouts: int, device: str, plans: int, side: float, thorough: 
 
     instants = []
 
-    def act(futures: nuno.World, knots: np.ndarray) -> None:
+    def go(futures: nuno.World, motion: nuno.Knots) -> None:
         instants.append(time.perf_counter())
-        motion = nuno.Knots(begin, knots, 1.0)
         for k, vertex in enumerate(far):
             futures.grip("cloth", np.array([vertex]), to=motion.path(futures.time, slice(3 * k, 3 * k + 3)))
         instants.append(time.perf_counter())
+
+    def act(futures: nuno.World, knots: np.ndarray) -> None:
+        go(futures, nuno.Knots(begin, knots, 1.0))
+
+    def now(_: nuno.World) -> np.ndarray:
+        instants.append(time.perf_counter())
+        return begin
 
     def cost(futures: nuno.World) -> np.ndarray:
         instants.append(time.perf_counter())
@@ -132,7 +139,18 @@ def measure_rate(rollouts: int, device: str, plans: int, side: float, thorough: 
         took.append(time.perf_counter() - clock)
         cpu.append(time.process_time() - core)
     best = float(np.median(took[1:]))
+    instants.clear()
+    found = nuno.replan(
+        world, go, cost, now=now, start=start, spread=0.05 * side, horizon=1.0, every=1.0 / 60.0, periods=plans + 1,
+        execute=lambda *_: None, samples=rollouts, iterations=1, bounds=(-1.0, 1.0), thorough=thorough,
+    )  # fmt: skip
+    again = found.planning_seconds
+    parts_again = np.diff(np.reshape(instants, (-1, 4)), axis=1)
+    parts_again = np.column_stack([parts_again, again - parts_again.sum(axis=1)])
+    middle = float(np.median(again[1:]))
     return {
+        "replan_s": middle, "replans_per_s": 1.0 / middle, "first_replan_s": float(again[0]),
+        "replan_parts_s": np.median(parts_again[1:], axis=0).tolist(),
         "rollouts": rollouts, "device": wp.get_device(device).name, "side": side,
         "substeps": cloth.resolution.substeps, "first_s": took[0], "plan_s": best, "rollouts_per_s": rollouts / best,
         "plans_per_s": 1.0 / best, "cpu_s": float(np.median(cpu[1:])), "thorough": thorough,
@@ -162,16 +180,18 @@ def print_rates(device: str, rollouts: list[int], asked: argparse.Namespace) -> 
     print(f"{wp.get_device(device).name}, a sheet of {asked.side:g} m with 20 x 20 cells")
     print(
         "| rollouts of 1 s | substeps | first plan, s | a plan, s | of it: imagine, act, simulate, score, ms | CPU s | "
-        "rollouts a second | plans a second |"
+        "rollouts a second | plans a second | replanning, s | of it: set back, act, simulate, score, ms | a second |"
     )
-    print("|---|---|---|---|---|---|---|---|", flush=True)
+    print("|---|---|---|---|---|---|---|---|---|---|---|", flush=True)
     for count in rollouts:
         row = measure_rate(count, device, asked.plans, asked.side, asked.thorough)
         rows.append(row)
         print(
-            f"| {count:,} | {row['substeps']} | {row['first_s']:.2f} | {row['plan_s']:.3f} | "
-            f"{', '.join(f'{1000.0 * part:.0f}' for part in row['parts_s'])} | {row['cpu_s']:.2f} | "
-            f"{row['rollouts_per_s']:,.1f} | {row['plans_per_s']:.2f} |", flush=True,
+            f"| {count:,} | {row['substeps']} | {row['first_s']:.2f} | {row['plan_s']:.4f} | "
+            f"{', '.join(f'{1000.0 * part:.1f}' for part in row['parts_s'])} | {row['cpu_s']:.2f} | "
+            f"{row['rollouts_per_s']:,.1f} | {row['plans_per_s']:.2f} | {row['replan_s']:.4f} | "
+            f"{', '.join(f'{1000.0 * part:.1f}' for part in row['replan_parts_s'])} | {row['replans_per_s']:.2f} |",
+            flush=True,
         )  # fmt: skip
         if asked.json:
             asked.json.write_text(json.dumps(rows, indent=1), encoding="utf-8")

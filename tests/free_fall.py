@@ -47,7 +47,7 @@ class FreeFall:
 
     def __init__(self, topology, material, positions, velocities, *, device, gravity, frame_rate, substeps, friction):
         self.gravity, self.frame = np.array(gravity, dtype=np.float32), 1.0 / frame_rate
-        self.set_state(positions, velocities)
+        self.set_state(positions, np.zeros_like(positions) if velocities is None else velocities)
         self.friction, self.grips, self.forces, self.colliders = friction, [], None, None
         self.runs = []
         # never fast: no figures of a run, and as thick as may be
@@ -117,6 +117,9 @@ class FreeFall:
     def set_grips(self, grips):
         """Take the grips."""
         self.grips = list(grips)
+
+    def forget_grips(self):
+        """Be told that others will come."""
 
     def set_forces(self, forces):
         """Take the forces."""

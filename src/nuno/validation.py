@@ -49,7 +49,7 @@ def finite_array(name: str, value: Any, *shapes: Shape, error: type[Exception] =
         array = np.array(value)
         if array.dtype.kind not in "iufO":
             raise ValueError(f"{array.dtype} is no real number")
-        array = array.astype(np.float64)
+        array = array.astype(np.float64, copy=False)  # it is a copy already
     except (TypeError, ValueError, OverflowError) as problem:
         raise error(f"{name} must be numbers of shape {_shape_text(shapes)}, got {_short(value)}") from problem
     if not any(_fits(array.shape, shape) for shape in shapes):
@@ -97,6 +97,8 @@ def number(name: str, value: Any, *, low: float = -np.inf, above: float = -np.in
     Raises:
         InvalidInputError: not a number, not finite, or out of range.
     """
+    if type(value) is float and low <= value <= high and above < value < np.inf:  # what every tick asks
+        return value
     valid = f"> {above:g}" if above > -np.inf else f">= {low:g}" if low > -np.inf else "finite"
     if high < np.inf:
         valid += f" and <= {high:g}"

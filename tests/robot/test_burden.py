@@ -7,6 +7,7 @@ import pinocchio as pin
 import pytest
 
 import nuno
+from nuno.robot.burden import StrainSensors
 from nuno.robot.support import distance_inside
 
 LOOK = 1.1  # [s] two looks
@@ -116,18 +117,39 @@ def test_flags_are_restored():
 
 def test_a_robot_at_rest_is_looked_at_no_more(monkeypatch):
     """Without anything dynamic in its world."""
-    from nuno.robot.sensors import Sensors
-
     counts = [0]
-    own = Sensors.read
+    own = StrainSensors.strain
 
     def counted(*arguments):
         counts[0] += 1
         return own(*arguments)
 
-    monkeypatch.setattr(Sensors, "read", counted)
+    monkeypatch.setattr(StrainSensors, "strain", counted)
     robot = make()
     robot.sleep(5.0)
     before = counts[0]
     robot.sleep(2.0)
     assert 0 < before == counts[0]
+
+
+def test_a_look_finds_what_the_sensors_tell():
+    """Torques and the zero moment point, of which a look needs no more, have the sensors' bits, a towel in the hand."""
+    robot = make()
+    place = robot.actual.frame_pose("left_hand").to_world([(0.0, 0.0, 0.03)])[0]
+    towel = robot.world.add(nuno.sheet((0.1, 0.1), cells=(3, 3), position=place + np.array([0.05, 0.05, 0.0])))
+    robot.world.attach(towel, nuno.Cloth.preset("towel"))
+    assert robot.hands["left_hand"].close()
+    robot.angle_vector({"arm_left_4_joint": -1.0}, 1.0)
+    looks, reads = (StrainSensors(robot.actual, robot.links) for _ in range(2))
+    for frames in (1, 1, 5, 1):  # what was noted in the frame before, and too long ago
+        robot.sleep(frames / 60.0)
+        told = reads.read(robot.state())
+        torques, point = looks.strain(robot.state())
+        assert torques.tobytes() == told.torques.tobytes() and point.tobytes() == told.zero_moment_point.tobytes()
+    noting, reading = (StrainSensors(robot.actual, robot.links) for _ in range(2))
+    noting.note_loads()  # in place of a whole reading, which the sensors that read have
+    reading.read(robot.state())
+    robot.sleep(1.0 / 60.0)
+    told = reading.read(robot.state())
+    torques, point = noting.strain(robot.state())
+    assert torques.tobytes() == told.torques.tobytes() and point.tobytes() == told.zero_moment_point.tobytes()

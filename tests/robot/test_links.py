@@ -167,3 +167,20 @@ def test_two_robots_of_one_name(still_talos):
     sensors = Sensors(second.robot, second)
     assert sensors._feels == Sensors(first.robot, first)._feels
     assert sensors._feels["left_wrist"][index]
+
+
+def test_only_what_has_moved_is_worked_out_anew(room):
+    """With the same bits as all of it: a few joints, many, fingers, the base, one after the other, and none."""
+    (_, talos, links), rng = room, np.random.default_rng(4)
+    lower, upper = (np.clip(limit, -1.0, 1.0) for limit in talos.joint_limits)
+    fingers = [talos.joint_index(f"gripper_{side}_joint") for side in ("left", "right")]
+    for k in range(30):
+        angles = talos.angle_vector()
+        some = [fingers, [], range(len(angles)), rng.integers(0, len(angles), 3)][k % 4]
+        angles[list(some)] = rng.uniform(lower, upper)[list(some)]
+        talos.angle_vector(angles)
+        if k % 5 == 4:
+            talos.rotate(0.3, "z").translate((0.1, 0.0, 0.0))
+        links.follow(0.0)
+        for part, name in zip(links.poses(), ("position", "quaternion"), strict=True):
+            assert np.array([getattr(body, name) for body in links.bodies]).tobytes() == part.tobytes()

@@ -123,3 +123,48 @@ def test_bad_arguments_are_named():
         with pytest.raises(InvalidInputError, match=named):
             nuno.replan(world, push, miss, **{**options, **wrong})
     assert world.time == 0.0
+
+
+def test_futures_that_are_set_back_have_the_bits_of_new_ones(monkeypatch):
+    """Plans, and what comes of them, of a cloth that a hand leads: the batch is imagined once, or anew each time."""
+    from nuno.search.planned_futures import PlannedFutures
+
+    imagined, own = [], nuno.World.imagine
+    monkeypatch.setattr(nuno.World, "imagine", lambda *given, **named: imagined.append(1) or own(*given, **named))
+
+    def run(anew):
+        world = nuno.World(device="cpu")
+        world.add(nuno.box((0.6, 0.6, 0.02), name="table", position=(0.0, 0.0, -0.01)))
+        cloth = world.add(nuno.sheet((0.2, 0.2), cells=(4, 4), name="cloth", position=(0.0, 0.0, 0.002)))
+        world.attach(cloth)
+        held = []
+
+        def now(world):
+            while held:
+                held.pop().release()
+            return world.find("cloth").vertices[24].astype(float)
+
+        def act(world, motion):
+            grip = world.grip("cloth", [24], to=motion.path(world.time))
+            if world.world_count == 1:
+                held.append(grip)
+
+        def cost(futures):
+            return np.linalg.norm(futures.find("cloth").vertices[:, 24] - (0.0, 0.0, 0.05), axis=1)
+
+        begin = PlannedFutures.begin
+
+        def begin_anew(self, *given):
+            return begin(PlannedFutures(self._world), *given)
+
+        monkeypatch.setattr(PlannedFutures, "begin", begin_anew if anew else begin)
+        imagined.clear()
+        found = nuno.replan(
+            world, act, cost, now=now, start=[(0.1, 0.1, 0.1), (0.0, 0.0, 0.05)], spread=0.05, horizon=0.2, every=0.1,
+            periods=3, samples=4, iterations=2, bounds=(-0.3, 0.3), thorough=False,
+        )  # fmt: skip
+        monkeypatch.setattr(PlannedFutures, "begin", begin)
+        return [plan.knots.tobytes() for plan in found.plans], cloth.vertices.tobytes(), len(imagined)
+
+    plans, vertices, times = run(anew=False)
+    assert (plans, vertices, 3) == run(anew=True) and times == 1

@@ -73,3 +73,18 @@ def test_at_its_ends_a_turn_keeps_the_bits():
     b[:30], b[30:60] = a[:30], -a[30:60]
     for end in (0.0, 1.0):
         np.testing.assert_array_equal(quat.slerp(a, b, np.array(end)), quat.slerp(a, b, np.full(300, end)))
+
+
+def test_a_path_takes_arrays_as_they_are():
+    """With the numbers of one that copies them, which nobody writes to any more; what it cannot be is told."""
+    from nuno.shapes.path import path_through
+
+    times, positions = np.array([0.0, 0.5, 1.0]), np.random.default_rng(0).normal(size=(3, 4, 3)).swapaxes(0, 1)
+    copied, own = Path(times, positions), path_through(times, positions)
+    assert own.positions is positions and own.world_count == copied.world_count == 4 and own.quaternions is None
+    assert own.at([0.2, 2.0]).tobytes() == copied.at([0.2, 2.0]).tobytes()
+    with pytest.raises(ValueError, match="read-only"):
+        positions[0] = 0.0
+    for wrong in ((times, np.full((3, 3), np.inf)), (times + 1e17, np.zeros((3, 3)))):
+        with pytest.raises(InvalidInputError):
+            path_through(*wrong)

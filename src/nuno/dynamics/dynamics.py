@@ -145,7 +145,8 @@ class ParticleDynamics(Dynamics):
         shape: Its shape.
         material: Its material.
         positions: (worlds, n, 3) [m].
-        velocities: (worlds, n, 3) [m/s].
+        velocities: (worlds, n, 3) [m/s]; None leaves all at zero until ``load_state``, and of ``positions`` takes the
+            shape only.
         friction: The body's coefficient, a number or (worlds,).
         world: The world whose batch, device, gravity and frame rate are used.
 
@@ -160,7 +161,7 @@ class ParticleDynamics(Dynamics):
         shape: Shape,
         material: Material,
         positions: np.ndarray,
-        velocities: np.ndarray,
+        velocities: np.ndarray | None,
         friction: Any,
         world: WorldSettings,
     ) -> None:
@@ -296,6 +297,8 @@ class ParticleDynamics(Dynamics):
 
     def load_state(self, state: State) -> None:
         """Set the state that `state` gave; what shapes gave before that was in another past."""
+        if self.grips_changed:  # others come before the next frame
+            self.solver.forget_grips()
         self.solver.load_state(state)
         self._forget_impulses()
 

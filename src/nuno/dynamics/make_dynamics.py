@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def make_dynamics(body: Body, material: Material, state: State, friction: Any, world: RigidWorld) -> Dynamics:
-    """Return dynamics for a body, in a state that dynamics of its kind gave.
+    """Return dynamics for a body, to be loaded with a state that dynamics of its kind gave.
 
     Raises:
         InvalidInputError: the shape has no such dynamics, or the material does not fit the shape or the batch.
@@ -26,13 +26,7 @@ def make_dynamics(body: Body, material: Material, state: State, friction: Any, w
         from nuno.dynamics.rigid_dynamics import RigidDynamics
 
         return RigidDynamics(body, material, friction, world, state)
-    local, origin, velocities = state["local"], state["origin"], state["velocities"]
-    alike = local.strides[0] == 0 and origin.strides[0] == 0
-    positions = (local[:1] if alike else local).astype(np.float64) + (origin[:1] if alike else origin)[:, None]
-    positions = np.broadcast_to(positions, local.shape)
-    made = ParticleDynamics(body.shape, material, positions, velocities, friction, world)
-    made.load_state(state)
-    return made
+    return ParticleDynamics(body.shape, material, state["local"], None, friction, world)
 
 
 def start_dynamics(body: Body, material: Any, world: RigidWorld) -> Dynamics:

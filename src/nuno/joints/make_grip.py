@@ -90,7 +90,8 @@ def make_grip(
     if compliance == 0.0 and limits is None:
         jumps = np.linalg.norm(np.where(valid.any(axis=1, keepdims=True), jump, 0.0), axis=-1)
         _tell_jump(body, float(jumps.max()))
-    spec = GripSpec(vertices, corners, weights, times, np.array(keys), interpolation, compliance, limits)
+    keys = keys if keys.base is None else np.array(keys)  # along a path they are a grip's own already
+    spec = GripSpec(vertices, corners, weights, times, keys, interpolation, compliance, limits)
     return Grip(body, spec, target, local)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import warp as wp
 
-from nuno.plans.cpu_threads import core_count, thread_pool
+from nuno.plans.cpu_threads import work_together
 from nuno.plans.recorded_launches import RecordedLaunches
 from nuno.state.cloth_state import Settings
 
@@ -20,9 +20,9 @@ def launch_groups(
 ) -> None:
     """Run a kernel over every group of lanes, a thread per core.
 
-    A group by itself is a recorded launch: bodies that go together launch it at every substep. Several go through the
-    run piece by piece, so that three groups on two cores take one and a half times as long as one, not twice. Warp's
-    CPU launches release the GIL.
+    Runs that are short are recorded launches: bodies that go together launch them at every substep. Several groups go
+    through a longer run piece by piece, so that three groups on two cores take one and a half times as long as one, not
+    twice. Warp's CPU launches release the GIL.
 
     Args:
         launches: Where it is recorded.
@@ -33,17 +33,17 @@ def launch_groups(
         run: Settings of the run.
         substeps: Its length.
     """
-    if groups == 1:
-        launches.launch(kernel, 1, [*before, run, shapes, 0, substeps])
+    if groups == 1 or substeps < 2 * PIECES:
+        launches.launch_parts(kernel, 1, [*before, run, shapes], range(groups), [substeps])
         return
     wp.load_module(kernel.module, device="cpu")  # here, for every thread would compile it for itself
-    pieces = [run] if substeps < 2 * PIECES else [_from(run, k * substeps // PIECES) for k in range(PIECES)]
+    pieces = [_from(run, k * substeps // PIECES) for k in range(PIECES)]
     ends = [piece.first - run.first for piece in pieces[1:]] + [substeps]
     waiting: SimpleQueue[tuple[int, int]] = SimpleQueue()
     for group in range(groups):
         waiting.put((group, 0))
 
-    def work(_: int) -> None:
+    def work() -> None:
         while True:
             try:
                 group, k = waiting.get_nowait()
@@ -54,7 +54,7 @@ def launch_groups(
             if k + 1 < len(pieces):
                 waiting.put((group, k + 1))
 
-    list(thread_pool().map(work, range(min(core_count(), groups))))
+    work_together(work, groups)
 
 
 def _from(run: Settings, start: int) -> Settings:

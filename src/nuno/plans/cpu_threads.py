@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
+from itertools import count
 from typing import Any
 
 _threads: ThreadPoolExecutor | None = None
@@ -24,9 +25,26 @@ def core_count() -> int:
 
 
 def run_together(calls: Sequence[Callable[[], Any]]) -> None:
-    """Call functions without arguments on the threads, and return when all are done."""
-    if len(calls) == 1 or core_count() == 1:
-        for call in calls:
-            call()
-        return
-    list(thread_pool().map(lambda call: call(), calls))
+    """Call functions without arguments on this thread and others, and return when all are done.
+
+    Each thread takes the next call until there are none. So few tasks are handed over, which takes longer than many a
+    call, and this thread does its part.
+    """
+    left = count()
+
+    def work() -> None:
+        while (k := next(left)) < len(calls):
+            calls[k]()
+
+    work_together(work, len(calls))
+
+
+def work_together(work: Callable[[], Any], most: int) -> None:
+    """Call one function on this thread and others, one a core and ``most`` in all, and return when all are done."""
+    others = [thread_pool().submit(work) for _ in range(min(core_count(), most) - 1)]
+    try:
+        work()
+    finally:
+        wait(others)
+    for other in others:
+        other.result()

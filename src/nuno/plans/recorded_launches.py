@@ -63,6 +63,22 @@ class RecordedLaunches:
             ]
         )
 
+    def launch_parts(
+        self, kernel: Any, dim: int, inputs: Sequence[Any], parts: Sequence[int], last: Sequence[Any]
+    ) -> None:  # fmt: skip
+        """Launch a kernel once for each of some parts, on all cores of the CPU.
+
+        Args:
+            kernel: Which.
+            dim: Threads of a launch.
+            inputs: Its arguments before the one that says which part it is.
+            parts: Which there are; none must touch what another's launch does.
+            last: Its arguments after that.
+        """
+        run_together(
+            [self._recording(kernel, dim, [*inputs, part, *last], (kernel, part)).launch for part in parts]
+        )  # fmt: skip
+
     def _recording(self, kernel: Any, dim: int | tuple[int, ...], inputs: Sequence[Any], key: Hashable) -> Any:
         """Return the launch that is recorded by a key, with these arguments."""
         if key not in self._recorded:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -31,6 +32,19 @@ LIFTED = 5e-3
 """[m] Above the lowest corner of all soles, from where on a sole does not bear."""
 
 
+class StrainSensors(Sensors):
+    """Sensors that are asked for no more than what strains a robot without dynamics."""
+
+    def strain(self, state: RobotState) -> tuple[np.ndarray, np.ndarray | None]:
+        """Return of ``read`` torques (n,) [N m; N] and zero moment point (2,) [m], None where no foot stands.
+
+        Args:
+            state: How the robot moves, at the time that the world has now.
+        """
+        torques, _, point, _ = self._balance(state, None)
+        return torques, point
+
+
 class Burden:
     """Looks every ``EVERY`` frames whether the joints' torques and the balance are possible.
 
@@ -44,7 +58,7 @@ class Burden:
 
     def __init__(self, robot: Humanoid, links: Links) -> None:
         self._links, self._robot = links, robot
-        self._sensors = Sensors(robot, links)
+        self._sensors = StrainSensors(robot, links)
         limits = robot.effort_limits
         self._limits = np.where(np.isfinite(limits) & (limits > 0.0), limits, np.inf)
         frames = links.robot.description.frames
@@ -64,7 +78,7 @@ class Burden:
             self._look(state)
         if met is None and not self._overloaded and self._unbalanced is None:
             return state
-        return replace(state, over_torque=self._overloaded, unbalanced=self._unbalanced, collision=met)
+        return state.judged(self._overloaded, self._unbalanced, met)
 
     def forget(self) -> None:
         """Begin anew: the robot was put elsewhere."""
@@ -79,28 +93,28 @@ class Burden:
         self._frames, self._still, self._last, self._overloaded, self._unbalanced = saved
 
     def _look(self, state: RobotState) -> None:
-        loaded = any(body.is_dynamic for body in self._links.world.bodies)
         moves = bool(state.v.any() or state.a.any())
-        self._still = 0 if moves or loaded else self._still + 1
+        changes = moves or any(body.is_dynamic for body in self._links.world.bodies)
+        self._still = 0 if changes else self._still + 1
         prepares = self._frames < EVERY
         self._frames %= EVERY
         if self._still > 2 * ENOUGH:
             return
         if prepares:
-            self._sensors.follow_loads()  # a look takes what has changed since the frame before
+            self._sensors.note_loads()  # a look takes what has changed since the frame before
             return
-        readings = self._sensors.read(state)
+        torques, point = self._sensors.strain(state)
         soles = self._sensors.soles
         if soles is not None and abs(float(soles[:, :, 2].min()) - self._sensors.ground) > LEVEL:
             self._sensors.ground = float(soles[:, :, 2].min())
-            readings = self._sensors.read(state)
-        over = frozenset(np.flatnonzero(np.abs(readings.torques) > self._limits).tolist())
-        outside = -np.inf if soles is None else self._outside(soles, readings.zero_moment_point)
+            torques, point = self._sensors.strain(state)
+        over = frozenset(np.flatnonzero(np.abs(torques) > self._limits).tolist())
+        outside = -np.inf if soles is None or point is None else self._outside(soles, point)
         last, self._last = self._last, (over, outside)
         both = over & last[0]
         self._overloaded = tuple(self._robot.joint_names[k] for k in sorted(both)) if both else ()
         if both:
-            self._tell_torques(readings.torques)
+            self._tell_torques(torques)
         if min(outside, last[1]) <= TIPPING:
             self._unbalanced = None
         elif self._unbalanced is None:
@@ -127,17 +141,23 @@ class Burden:
 
     def _outside(self, soles: np.ndarray, point: np.ndarray) -> float:
         """Return how far outside the hull of soles (feet, 4, 3) a point (2,) is [m]; -inf where it is well inside."""
-        if not np.isfinite(point).all():
+        x, y = point.tolist()
+        if not (math.isfinite(x) and math.isfinite(y)):
             return -np.inf
         heights = soles[:, :, 2]
         bearing = soles[heights.min(axis=1) < heights.min() + LIFTED]
         # balls in the soles, and all that lies between two of them, are in the hull
-        middles = bearing[:, :, :2].mean(axis=1)
-        a, along = middles[0], middles[-1] - middles[0]
-        share = float(np.clip((point - a) @ along / max(along @ along, 1e-12), 0.0, 1.0))
-        away = point - a - share * along
-        if away @ away < self._inner**2:
+        (ax, ay), (bx, by) = (_middle(sole) for sole in (bearing[0].tolist(), bearing[-1].tolist()))
+        along_x, along_y = bx - ax, by - ay
+        share = ((x - ax) * along_x + (y - ay) * along_y) / max(along_x**2 + along_y**2, 1e-12)
+        share = min(max(share, 0.0), 1.0)
+        if (x - ax - share * along_x) ** 2 + (y - ay - share * along_y) ** 2 < self._inner**2:
             return -np.inf
         corners = bearing.reshape(-1, 3)
         corners = corners[corners[:, 2] < corners[:, 2].min() + LIFTED, :2]
         return -distance_inside(convex_outline(corners), point) if len(corners) > 2 else -np.inf
+
+
+def _middle(corners: list[list[float]]) -> tuple[float, float]:
+    """Return x and y [m] of the middle of four corners."""
+    return 0.25 * sum(own[0] for own in corners), 0.25 * sum(own[1] for own in corners)

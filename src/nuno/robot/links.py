@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,6 +22,41 @@ if TYPE_CHECKING:
     from nuno.world.world import World
 
 MESHES = ("collision", "visual", "joints")
+KEPT_PARTS = 64
+"""Of sets of joints that move together, for which is kept which bodies they move."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """Some of the bodies, and what it takes to tell where they are.
+
+    Attributes:
+        which: (k,) int, the bodies.
+        joints: (k,) int, Pinocchio's joints that carry them.
+        placements: Pinocchio's, of those joints, each once.
+        turns: (k, 4) int, where in those placements as ``pin.SE3ToXYZQUAT`` has them, one after the other, the numbers
+            w, x, y, z are.
+        turned_by: (k, 4, 4) float, by which they are multiplied.
+    """
+
+    which: np.ndarray
+    joints: np.ndarray
+    placements: list[Any]
+    turns: np.ndarray
+    turned_by: np.ndarray
+
+    def place(self, axes: np.ndarray, origins: np.ndarray, offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return positions (k, 3) [m] and quaternions (k, 4).
+
+        Args:
+            axes: (joints, 3, 3), of all of Pinocchio's joints.
+            origins: (joints, 3) [m].
+            offsets: (k, 3) [m], where the bodies are in the frames of their joints.
+        """
+        # joined as bytes, which takes a fraction of what putting many short arrays together does
+        turns = np.frombuffer(b"".join(map(pin.SE3ToXYZQUAT, self.placements))).take(self.turns)
+        places = _placed(axes[self.joints], origins[self.joints], offsets)
+        return places, np.einsum("kij,kj->ki", self.turned_by, turns)
 
 
 class Links:
@@ -75,6 +111,9 @@ class Links:
         self._turned_by = np.stack([quat.multiply(row, self._turns) for row in np.eye(4)], axis=2)
         self._placements = robot.data.oMi.tolist()
         self._joint_axes, self._joint_places = placement_arrays(self._placements)
+        self._all = self._part(np.arange(len(self.bodies)))
+        self._moved_with: dict[bytes, _Part] = {}  # by which joints have moved
+        self._last: tuple[np.ndarray, Pose, Pose] | None = None  # angles, the base, and where the bodies were then
         self._inside = True
         self._kinematic_group = KinematicGroup(self._keys)
         for body in self.bodies:
@@ -93,10 +132,50 @@ class Links:
     def poses(self) -> tuple[np.ndarray, np.ndarray]:
         """Return where the robot has its shapes now: positions (n, 3) [m] and quaternions (n, 4)."""
         self.robot.update()
-        joints, offsets = self._rows, self.finger_bodies.offset(self._offsets, self.robot.angle_vector())
-        turns = np.concatenate([pin.SE3ToXYZQUAT(own) for own in self._placements]).reshape(-1, 7)[:, [6, 3, 4, 5]]
-        places = _placed(self._joint_axes[joints], self._joint_places[joints], offsets)
-        return places, np.einsum("kij,kj->ki", self._turned_by, turns[joints])
+        offsets = self.finger_bodies.offset(self._offsets, self.robot.angle_vector())
+        return self._all.place(self._joint_axes, self._joint_places, offsets)
+
+    def _poses(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return what `poses` does, never to be written to: only what has moved since the last time is worked out."""
+        self.robot.update()
+        angles, base, last = self.robot.angle_vector(), self.robot.pose(), self._last
+        part = self._all
+        if last is not None and base[0] is last[1][0] and base[1] is last[1][1]:
+            part = self._moved(angles != last[0])
+        if last is not None and not len(part.which):
+            return last[2]
+        offsets = self.finger_bodies.offset(self._offsets, angles)
+        if part is self._all or last is None:
+            found = part.place(self._joint_axes, self._joint_places, offsets)
+        else:
+            found = last[2][0].copy(), last[2][1].copy()
+            own = part.place(self._joint_axes, self._joint_places, offsets[part.which])
+            found[0][part.which], found[1][part.which] = own
+        self._last = angles, base, found
+        return found
+
+    def _moved(self, rows: np.ndarray) -> _Part:
+        """Return the bodies that go along with joints, of which ``rows`` (dof,) bool is True; of most of them all."""
+        part = self._moved_with.get(kind := rows.tobytes())
+        if part is None:
+            joints = set((np.flatnonzero(rows) + 2).tolist())
+            moved = [not joints.isdisjoint(self.robot.model.supports[own].tolist()) for own in self.joints]
+            for finger, own in zip(self.finger_bodies.fingers, self.finger_bodies.bodies, strict=True):
+                for k in own if rows[finger.row] else ():
+                    moved[k] = True
+            which = np.flatnonzero(moved)
+            part = self._part(which) if 2 * len(which) < len(moved) else self._all
+            if len(self._moved_with) >= KEPT_PARTS:
+                self._moved_with.clear()
+            self._moved_with[kind] = part
+        return part
+
+    def _part(self, which: np.ndarray) -> _Part:
+        joints = self._rows[which]
+        carriers, carrier = np.unique(joints, return_inverse=True)
+        turns = 7 * carrier.reshape(-1, 1) + np.array([6, 3, 4, 5])
+        placements = [self._placements[joint] for joint in carriers.tolist()] or self._placements[:1]
+        return _Part(which, joints, placements, turns, self._turned_by[which])
 
     def poses_at(
         self, axes: np.ndarray, origins: np.ndarray, angles: np.ndarray, which: np.ndarray | None = None
@@ -133,7 +212,7 @@ class Links:
         """
         duration = number("seconds", seconds, low=0.0)
         self._check_inside()
-        positions, quaternions = self.poses()
+        positions, quaternions = self._poses()
         with self.world.lock:
             start, now = self._kinematic_group.arrived(self.bodies, self.world.time), self.world.time
             if duration == 0.0:

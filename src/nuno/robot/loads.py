@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.bodies.body import Body
-from nuno.dynamics.dynamics import ParticleDynamics
+from nuno.dynamics.dynamics import ParticleDynamics, dynamics_of
 from nuno.joints.held_points import held_points
 from nuno.materials import Cloth
 from nuno.robot.ground import moment
@@ -77,6 +77,7 @@ class LinkLoads:
         self._read_at: tuple[float, tuple[str, ...]] | None = None
         self._loads: tuple[Load, ...] = ()
         self._motions: dict[Body, _Motion] = {}
+        self._noted: dict[Body, _Motion] = {}
         self._contacts: dict[Body, list[Load]] = {}
         self._arrays: dict[Body, tuple[Any, list[np.ndarray]]] = {}  # places and velocities of vertices, by solver
         self._boxes = StaticBoxes(self._world)
@@ -86,7 +87,7 @@ class LinkLoads:
         """Return all loads, those of the last frame."""
         world = self._world
         with world.lock:
-            moving: list[Any] = [body for body in world._bodies.values() if body.is_dynamic and body not in self._index]
+            moving = self._moving()
             now = (world.time, tuple(grip.key for body in moving for grip in body._dynamics.grips))
             if now != self._read_at:
                 self._loads = tuple(load for body in moving for load in self._of(body))
@@ -97,15 +98,32 @@ class LinkLoads:
                 self._read_at = now
         return self._loads
 
+    def note(self) -> None:
+        """Take note of how bodies move now, for a reading in the next frame; what bears on links is not worked out."""
+        with self._world.lock:
+            self._noted = {}
+            for body in self._moving():
+                dynamics = dynamics_of(body)
+                if isinstance(dynamics, ParticleDynamics) and _has_momentum(dynamics):
+                    rows = self._rows_of(body, dynamics.solver)
+                    self._noted[body] = _motion_of(rows, dynamics.solver.mass[0], self._world.time)
+
+    def _moving(self) -> list[Any]:
+        """Return all bodies with dynamics but the links."""
+        return [body for body in self._world._bodies.values() if body.is_dynamic and body not in self._index]
+
     def _of(self, body: Body) -> list[Load]:
         dynamics: Any = body._dynamics
         motion = before = None
         if isinstance(dynamics, ParticleDynamics):
             rows = self._rows_of(body, dynamics.solver)
             x = rows[:3]
-            if not any(grip.is_tie for grip in dynamics.grips):
+            if _has_momentum(dynamics):
                 motion = _motion_of(rows, dynamics.solver.mass[0], self._world.time)
                 before, self._motions[body] = self._motions.get(body), motion
+                noted = self._noted.pop(body, None)
+                if noted is not None and noted.time != motion.time:
+                    before = noted
         else:
             x = _places(body)
         held_by = [self._index.get(grip.target) for grip in dynamics.grips if grip.target is not None]
@@ -193,6 +211,11 @@ class LinkLoads:
         if body._dynamics is None or not body._dynamics.is_rigid:  # a large face of those may touch where no corner is
             others = [k for k in others if boxes.hold_any(k, x, low, high, margin)]
         return [boxes.bodies[k] for k in (*held, *others)]
+
+
+def _has_momentum(dynamics: ParticleDynamics) -> bool:
+    """Return True if a body's momentum tells what bears it: what it is tied to has some of it else."""
+    return not any(grip.is_tie for grip in dynamics.grips)
 
 
 def _places(body: Body) -> np.ndarray:

@@ -55,6 +55,7 @@ class RobotModel(Coordinates):
         self._add_frames()
         self.data, self.scratch = self.model.createData(), self.model.createData()  # of now, and for what might be
         self._angles = np.zeros(len(self.joint_names))
+        self._configured: np.ndarray | None = None  # its configuration, while nothing moves it
         self._is_current = False
 
     @property
@@ -79,7 +80,7 @@ class RobotModel(Coordinates):
         """
         if angles is not None:
             self._angles = self.checked_angles(angles)
-            self._is_current = False
+            self._forget_places()
         return self._angles.copy()
 
     def checked_angles(self, angles: ArrayLike | Mapping[str, float]) -> np.ndarray:
@@ -138,7 +139,8 @@ class RobotModel(Coordinates):
         made._position, made._quaternion = self.pose()
         made._parent, made._children = None, []
         made.data, made.scratch = self.model.createData(), self.model.createData()
-        made._angles, made._is_current = self._angles.copy(), False
+        made._angles = self._angles.copy()
+        made._forget_places()
         return made
 
     # Where everything is
@@ -234,12 +236,15 @@ class RobotModel(Coordinates):
         Raises:
             InvalidInputError: the robot follows a frame that has a pose for each world of a batch.
         """
+        if self._configured is not None:
+            return self._configured.copy()
         position, quaternion = self.pose()
         if position.ndim != 1 or quaternion.ndim != 1:
             raise InvalidInputError("a robot has one pose, not one for each world")
         q = self.configuration_of(self._angles, IDENTITY)
         q[:3], q[3:6], q[6] = position, quaternion[1:], quaternion[0]
-        return q
+        self._configured = q
+        return q.copy()
 
     def configuration_of(self, angles: np.ndarray, base: np.ndarray) -> np.ndarray:
         """Return the configuration (nq,) with angles (n,) and a base (7,): position, quaternion (x, y, z, w).
@@ -273,7 +278,8 @@ class RobotModel(Coordinates):
 
     def move_to(self, angles: np.ndarray, base: np.ndarray | None = None) -> None:
         """Take angles (n,) within limits, and a pose (7,) of the base as in a configuration, without any checks."""
-        self._angles, self._is_current = angles, False
+        self._angles = angles
+        self._forget_places()
         if base is not None:
             self._place(base[:3].copy(), base[[6, 3, 4, 5]])
 
@@ -287,8 +293,11 @@ class RobotModel(Coordinates):
     # Inside
 
     def _moved(self) -> None:
-        self._is_current = False
+        self._forget_places()
         super()._moved()
+
+    def _forget_places(self) -> None:
+        self._is_current, self._configured = False, None
 
     def _pose_of_frame(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
         return pose_of(self.update().oMf[self.frame_index(frame)])
@@ -305,10 +314,7 @@ class RobotModel(Coordinates):
 
     def posture_configuration(self) -> np.ndarray:
         """Return the configuration (nq,) of the posture, the base where it is now."""
-        kept, self._angles = self._angles, self._posture()
-        q = self.configuration()
-        self._angles = kept
-        return q
+        return self.configuration_of(self._posture(), self.configuration()[:7])
 
     def _posture(self) -> np.ndarray:
         posture = self.description.posture

@@ -51,3 +51,19 @@ class RobotState:
     contacts: Mapping[str, Mapping[str, np.ndarray]] = field(default_factory=dict)
     joint_wrenches: np.ndarray | None = None
     footing: Footing | None = None
+
+    @staticmethod
+    def moving(time: float, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> RobotState:
+        """Return a state of which nothing else is known yet; in a third of the time, as one is made in every frame."""
+        state = object.__new__(RobotState)  # the other fields' defaults are the class's
+        state.__dict__.update(time=time, q=q, v=v, a=a, contacts={})
+        return state
+
+    def judged(
+        self, over_torque: tuple[str, ...], unbalanced: Unbalance | None, collision: Collision | None
+    ) -> RobotState:
+        """Return the same state with what was found of it."""
+        state = object.__new__(RobotState)
+        state.__dict__.update(self.__dict__)
+        state.__dict__.update(over_torque=over_torque, unbalanced=unbalanced, collision=collision)
+        return state

@@ -153,11 +153,45 @@ class Sensors:
                 f"a state of {self.robot.name!r} has q ({model.nq},), v and a ({model.nv},), got "
                 f"{state.q.shape}, {state.v.shape}, {state.a.shape}"
             )
-        torques = pin.rnea(model, data, state.q, state.v, state.a)
-        pin.updateGlobalPlacements(model, data)
         if state.joint_wrenches is not None and state.torques is not None:
+            pin.rnea(model, data, state.q, state.v, state.a)
+            pin.updateGlobalPlacements(model, data)
             point, pressed = self._feel(state, state.joint_wrenches)
             return self._readings(state.time, self._all_read(state, state.torques, {}, point, pressed))
+        torques, before, point, pressed = self._balance(state, stance)
+        torques = torques if state.torques is None else state.torques
+        return self._readings(state.time, self._all_read(state, torques, before, point, pressed))
+
+    @property
+    def soles(self) -> np.ndarray | None:
+        """The corners of the soles at the last reading, (feet, 4, 3) [m]; None without feet."""
+        return self._corners if self._feet else None
+
+    def note_loads(self) -> None:
+        """Take note of how bodies move: a reading in the next frame need not ask solvers for contacts then."""
+        if self._loads is not None:
+            self._loads.note()
+
+    def state_at_rest(self) -> RobotState:
+        """Return the state of the robot at rest where it is now, at the world's time."""
+        nothing = np.zeros(self._model.nv)
+        time = 0.0 if self.links is None else self.links.world.time
+        return RobotState(time, self.robot.configuration(), nothing, nothing)
+
+    # -- forces
+
+    def _balance(
+        self, state: RobotState, stance: Sequence[str] | None
+    ) -> tuple[np.ndarray, dict[str, np.ndarray], np.ndarray | None, np.ndarray]:
+        """Find by inverse dynamics what bears a robot without dynamics, and leave all forces in Pinocchio's data.
+
+        Returns:
+            Torques (n,) of the joints, what acts before wrench sensors as of ``_bear``, the zero moment point, None
+            where no foot stands, and how hard each foot presses [N].
+        """
+        model, data = self._model, self._data
+        torques = pin.rnea(model, data, state.q, state.v, state.a)
+        pin.updateGlobalPlacements(model, data)
         self._acting[:] = 0.0
         base = self._axes[1]
         force, torque = base @ self._lacking[:3], base @ self._lacking[3:]
@@ -170,26 +204,7 @@ class Sensors:
             point = self._stand(standing, force, torque, pressed)
         if standing or loads:
             torques = pin.rnea(model, data, state.q, state.v, state.a, self._external)
-        torques = torques[6:] if state.torques is None else state.torques
-        return self._readings(state.time, self._all_read(state, torques, before, point, pressed))
-
-    @property
-    def soles(self) -> np.ndarray | None:
-        """The corners of the soles at the last reading, (feet, 4, 3) [m]; None without feet."""
-        return self._corners if self._feet else None
-
-    def follow_loads(self) -> None:
-        """Take note of what bears on the links: a reading in the next frame need not ask solvers for contacts then."""
-        if self._loads is not None:
-            self._loads.read()
-
-    def state_at_rest(self) -> RobotState:
-        """Return the state of the robot at rest where it is now, at the world's time."""
-        nothing = np.zeros(self._model.nv)
-        time = 0.0 if self.links is None else self.links.world.time
-        return RobotState(time, self.robot.configuration(), nothing, nothing)
-
-    # -- forces
+        return torques[6:], before, point, pressed
 
     def _feel(self, state: RobotState, wrenches: np.ndarray) -> tuple[np.ndarray | None, np.ndarray]:
         """Take what the joints truly bore for what inverse dynamics say, after ``rnea``.

@@ -52,9 +52,13 @@ class SimulatedJoints:
         self.desired: Motion = (self.positions, self.velocities, self.accelerations)
         self._polynomials = with_derivatives(resting_at(self.positions))
         self._begin = np.zeros(count)
+        self._holds: bool | None = None  # whether those are constant; None is not known
         self.controllers: dict[str, TrajectoryController] = {}
         self.rows: dict[str, np.ndarray] = {}
         self._pending: tuple[float, Motion, Motion] | None = None
+        self._rested: tuple[Any, ...] = ()  # how they were when they were last found to rest
+        self._quiet: tuple[int, float] = (-1, 0.0)  # commands, and the clock before which nothing comes of them
+        self._busy: list[tuple[TrajectoryController, np.ndarray]] = []  # whose goals are told how it goes until then
         taken: set[str] = set()
         for name, joints in groups.items():
             if taken & set(joints):
@@ -68,9 +72,27 @@ class SimulatedJoints:
     @property
     def is_resting(self) -> bool:
         """Return True if nothing is asked of the joints, and they are where they are wanted."""
+        if self._still_rests:
+            return True
         if any([own.is_busy for own in self.controllers.values()]):
             return False
-        return bool((self.desired[0] == self.positions).all()) and not self.velocities.any()
+        if not (self.desired[0] == self.positions).all() or self.velocities.any():
+            return False
+        self._rested = (self.commands, self.positions, self.velocities, self.desired)
+        return True
+
+    @property
+    def _still_rests(self) -> bool:
+        """Return True if they rested when asked last and are as they were: no array of theirs is ever written to."""
+        rested = self._rested
+        return (
+            bool(rested) and rested[0] == self.commands and rested[1] is self.positions
+            and rested[2] is self.velocities and rested[3] is self.desired
+        )  # fmt: skip
+
+    @property
+    def _is_quiet(self) -> bool:
+        return self._quiet[0] == self.commands and self.clock < self._quiet[1]
 
     @property
     def followed(self) -> tuple[np.ndarray, np.ndarray]:
@@ -129,15 +151,30 @@ class SimulatedJoints:
         if duration <= 0.0 or (rows is None and self.is_resting):
             self._pending = (time, self.desired, motion)
             return motion
-        for name, controller in self.controllers.items():
-            if controller.advance(time):
-                self._follow(name)
-        desired = evaluate(self._polynomials, time - self._begin)
-        actual = limited(desired, motion, duration, self.velocity_limits, self.limits)
+        if self._quiet[0] != self.commands or time >= self._quiet[1]:
+            for name, controller in self.controllers.items():
+                if controller.advance(time):
+                    self._follow(name)
+            controllers = self.controllers.values()
+            self._quiet = (self.commands, min((own.next_event for own in controllers), default=np.inf))
+            self._busy = [(own, self.rows[name]) for name, own in self.controllers.items() if own.is_busy]
+        desired = self._desired_at(time)
         if rows is not None and given is not None:
-            desired, actual = _with(desired, rows, given), _with(actual, rows, given)
+            desired = _with(desired, rows, given)
+        actual = limited(desired, motion, duration, self.velocity_limits, self.limits)
+        if actual is not desired and rows is not None and given is not None:
+            actual = _with(actual, rows, given)
         self._pending = (time, desired, actual)
-        return self._pending[2]
+        return actual
+
+    def _desired_at(self, time: float) -> Motion:
+        """Return what the controllers want at a time [s], (n,) each."""
+        if self._holds is None:
+            constant = self._polynomials[0, 0]
+            self._holds = bool(np.count_nonzero(self._polynomials) == np.count_nonzero(constant))
+        if self._holds:  # as the polynomials give it, to the bit
+            return self._polynomials[0, 0] + 0.0, np.zeros(len(self._begin)), np.zeros(len(self._begin))
+        return evaluate(self._polynomials, time - self._begin)
 
     def put(self, positions: np.ndarray) -> None:
         """Be at rest at positions (n,); controllers give up what they do, and hold."""
@@ -164,7 +201,13 @@ class SimulatedJoints:
         assert self._pending is not None
         self.clock, self.desired, (self.positions, self.velocities, self.accelerations) = self._pending
         self._pending = None
+        if self._still_rests:  # of goals that have ended
+            return
         actual = actual or (self.positions, self.velocities, self.accelerations)
+        if self._is_quiet:
+            for controller, rows in self._busy:
+                controller.tell(self.clock, self.desired, actual, rows)
+            return
         for name, controller in self.controllers.items():
             if controller.check(self.clock, self.desired, actual, self.rows[name]):
                 self._follow(name)
@@ -209,6 +252,7 @@ class SimulatedJoints:
         rows, piece = self.rows[name], self.controllers[name].piece
         self._polynomials[:, :, rows] = with_derivatives(piece.coefficients)
         self._begin[rows] = piece.start
+        self._holds = None
 
 
 def limited(desired: Motion, now: Motion, duration: float, speeds: np.ndarray, limits: Any) -> Motion:
@@ -226,7 +270,7 @@ def limited(desired: Motion, now: Motion, duration: float, speeds: np.ndarray, l
     change = positions - now[0]
     lower, upper = limits
     held = (np.abs(change) > far) | (np.abs(velocities) * duration > far) | (positions < lower) | (positions > upper)
-    if not held.any():
+    if not np.count_nonzero(held):
         return desired
     reached = np.clip(now[0] + np.clip(change, -far, far), lower, upper)
     speed = (reached - now[0]) / duration

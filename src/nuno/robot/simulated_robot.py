@@ -315,7 +315,7 @@ class SimulatedRobot(SimulatedBody):
             self.balance.dynamics.lead_fingers(self.actual.angles_of(aim.q))
             return
         self._state = aim
-        if not (aim.q == before.q).all():
+        if aim.q is not before.q and np.count_nonzero(aim.q != before.q):
             if self.actual is not self.wanted:
                 self.actual.move_to(self.wanted._angles, aim.q[:7])
             self.links.follow(span)

@@ -99,7 +99,7 @@ class Stance:
     def _legs_move(self, present: np.ndarray, motion: Motion) -> list[bool]:
         positions, velocities, accelerations = motion
         moving = (positions != present) | (velocities != 0.0) | (accelerations != 0.0)
-        return [bool(moving[rows].any()) for rows in self._rows]
+        return [bool(np.count_nonzero(moving[rows])) for rows in self._rows]
 
     def _carried_by(
         self, k: int, sole: Any, motion: Motion

@@ -40,8 +40,8 @@ class StaticBoxes:
             self._halves = 0.5 * (corners[:, 1] - corners[:, 0])
             self._middles = corners[:, 0] + self._halves
             self._radii = np.linalg.norm(np.abs(self._middles) + self._halves, axis=1)
-        where = [b.pose()[0] for b in self.bodies]
-        where += [b.pose()[1] for b in self.bodies]
+        poses = [body.pose() for body in self.bodies]
+        where = [*(place for place, _ in poses), *(turn for _, turn in poses)]
         # a body that moves has other arrays from then on, never other numbers in the same
         if renewed or not all(map(is_, where, self._where)):
             self._where = where

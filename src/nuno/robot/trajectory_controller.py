@@ -180,6 +180,12 @@ class TrajectoryController:
             found[k:last], k = part, last
         return found
 
+    def tell(self, time: float, desired: Motion, actual: Motion, rows: np.ndarray) -> None:
+        """Give the goal under way its feedback: as ``check``, before the time of ``next_event``."""
+        goal = self.goal
+        if goal is not None and not goal.is_done:
+            goal.feedback = Feedback(time, self.names, rows, desired, actual)
+
     def check(self, time: float, desired: Motion, actual: Motion, rows: np.ndarray) -> bool:
         """Compare what is wanted at a time [s] with what is, and end the goal where that is due.
 

@@ -95,7 +95,7 @@ class TimedMotion(ABC):
         parts = []
         for part in (self.velocities, self.accelerations):
             parts.append(part[k].copy() if share == 0.0 else (1.0 - share) * part[k] + share * part[k + 1])
-        return RobotState(float(time), self._configuration(k, share), *parts)
+        return RobotState.moving(float(time), self._configuration(k, share), *parts)
 
     def _configuration(self, k: int, share: float) -> np.ndarray:
         if share == 0.0:

@@ -76,16 +76,16 @@ class WantedMotion:
             rows, given = joined(rows, given, *servo(before, others, base, span))
         positions, velocities, accelerations = self.joints.step(span, rows, given)
         if positions is robot._angles and base is None:
-            self.aim = RobotState(end, before.q, before.v, before.a)
+            self.aim = RobotState.moving(end, before.q, before.v, before.a)
             return self.aim
         if base is None and (stood := self.stance.base(robot._angles, (positions, velocities, accelerations))):
             base, base_motion = stood
-        v, a = np.zeros_like(before.v), np.zeros_like(before.a)
+        v, a = np.zeros(len(before.v)), np.zeros(len(before.a))
         v[6:], a[6:] = velocities, accelerations
         if base is not None and base_motion is not None:
             v[:6], a[:6] = base_motion
         robot.move_to(positions, base)
-        self.aim = RobotState(end, robot.configuration(), v, a)
+        self.aim = RobotState.moving(end, robot.configuration(), v, a)
         return self.aim
 
     def cancel(self) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.errors import InvalidInputError
-from nuno.shapes.path import Path
+from nuno.shapes.path import Path, path_through
 from nuno.validation import checked, finite_array, number
 
 LONGEST = 3600.0
@@ -91,7 +91,7 @@ class Knots:
             now = values = times
         if values.shape[-1] != 3 or values.ndim != self.values.ndim:
             raise InvalidInputError(f"columns must choose 3 of {self.now.shape[-1]} numbers, got {columns!r}")
-        return Path(t0 + times, Knots(now, values, self.seconds).at(times))
+        return path_through(t0 + times, Knots(now, values, self.seconds).at(times))
 
     @checked
     def later(self, seconds: float, *, shrink: bool = False) -> Knots:

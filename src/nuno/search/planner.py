@@ -15,6 +15,7 @@ from nuno.dynamics.dynamics import ParticleDynamics
 from nuno.engines.world_view import attached
 from nuno.errors import EstimationError, InvalidInputError, NunoError
 from nuno.search.knots import LONGEST
+from nuno.search.planned_futures import PlannedFutures
 from nuno.validation import checked, count, finite_array, function, number
 from nuno.world.impacts import fast_cloths, forget_fast
 from nuno.world.world import World
@@ -88,6 +89,19 @@ def plan(
         InvalidInputError: an argument out of range, or costs of another shape.
         EstimationError: no future of the first iteration has a finite cost.
     """
+    return plan_in(
+        PlannedFutures(world), world, act, cost, start=start, spread=spread, horizon=horizon, samples=samples,
+        iterations=iterations, method=method, elites=elites, temperature=temperature, bounds=bounds, seed=seed,
+        device=device, thorough=thorough,
+    )  # fmt: skip
+
+
+def plan_in(
+    batch: PlannedFutures, world: World, act: Callable[[World, np.ndarray], Any], cost: Callable[[World], Any], *,
+    start: ArrayLike, spread: ArrayLike, horizon: float, samples: int, iterations: int, method: str, elites: int | None,
+    temperature: float, bounds: tuple[ArrayLike, ArrayLike] | None, seed: int, device: str | None, thorough: bool,
+) -> Plan:  # fmt: skip
+    """Return what ``plan`` does, imagined in futures that a plan before may have made."""
     function("act", act)
     function("cost", cost)
     mean = finite_array("start", start, ("k", "d"))
@@ -111,10 +125,7 @@ def plan(
         raise InvalidInputError(f"samples must be at least 2 and as many as the elites, got {n} and {best_of}")
     heat = number("temperature", temperature, above=0.0)
     random, floor = np.random.default_rng(count("seed", seed, low=0)), SMALLEST * sigma
-    with world.lock:  # what futures go back to is the world as they were made of it
-        futures = world.imagine(n, device, thorough=thorough)
-        # of a robot's copies each has a state; all else is alike in all futures
-        saved = None if rounds == 1 else futures.save() if futures.drivers else world.save().spread(n)
+    futures, saved = batch.begin(n, device, thorough, rounds > 1)
     if not thorough:
         _have_floats(futures)
     found, lowest, failed, history = mean, np.inf, 0, []

@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike
 
 from nuno.errors import InvalidInputError
 from nuno.search.knots import LONGEST, Knots
-from nuno.search.planner import Plan, called, plan
+from nuno.search.planned_futures import PlannedFutures
+from nuno.search.planner import Plan, called, plan_in
 from nuno.validation import checked, count, finite_array, flag, function, number
 from nuno.world.world import World
 
@@ -76,7 +77,8 @@ def replan(
         bounds: Lowest and highest knots.
         seed: Of the samples; each period has its own.
         device: Where futures run.
-        thorough: As of ``plan``.
+        thorough: As of ``plan``. Without, all plans imagine in one batch, which goes back to the world as it is then
+            and keeps its memory until the last.
 
     Raises:
         InvalidInputError: an argument out of range, or a function of the caller's fails.
@@ -93,6 +95,7 @@ def replan(
     pause = number("every", every, above=0.0, high=span)
     rounds = count("periods", periods, high=10_000)
     shrinks, first = flag("shrink", shrink), count("seed", seed, low=0)
+    batch = PlannedFutures(world)
     plans: list[Plan] = []
     motions: list[Knots] = []
     took: list[float] = []
@@ -105,10 +108,10 @@ def replan(
             act(futures, Knots(here, values, span))
 
         begin = time.perf_counter()
-        found = plan(
-            world, imagined, cost, start=knots, spread=deviations * (span / whole), horizon=span, samples=samples,
-            iterations=iterations, method=method, elites=elites, temperature=temperature, bounds=bounds,
-            seed=first + k, device=device, thorough=thorough,
+        found = plan_in(
+            batch, world, imagined, cost, start=knots, spread=deviations * (span / whole), horizon=span,
+            samples=samples, iterations=iterations, method=method, elites=elites, temperature=temperature,
+            bounds=bounds, seed=first + k, device=device, thorough=thorough,
         )  # fmt: skip
         took.append(time.perf_counter() - begin)
         motion = Knots(here, found.knots, span)

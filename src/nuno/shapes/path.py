@@ -115,6 +115,31 @@ def path_as_it_is(
     return path
 
 
+def path_through(times: np.ndarray, positions: np.ndarray) -> Path:
+    """Return a path by straight lines through positions (k, 3) or (worlds, k, 3) [m], which it takes as its own.
+
+    Arrays are not copied, as of many worlds that takes most of the time; otherwise it is as ``Path(times, positions)``.
+
+    Args:
+        times: (k,) float [s], increasing.
+        positions: Nobody else is to write to them.
+
+    Raises:
+        InvalidInputError: positions that are not finite, as sums of very large ones are, or times that do not increase,
+            as after a very late one.
+    """
+    if (np.diff(times) <= 0.0).any():
+        raise InvalidInputError("times must increase from key to key")
+    if not np.isfinite(positions).all():
+        raise InvalidInputError("positions must be finite")
+    path: Path = object.__new__(Path)
+    for name, array in (("times", times), ("positions", positions)):
+        array.setflags(write=False)
+        path.__dict__[name] = array
+    path.__dict__.update(quaternions=None, interpolation="linear")
+    return path
+
+
 def minimum_jerk(share: np.ndarray) -> np.ndarray:
     """Return how far a motion of least jerk, from rest to rest, is at a share of its time, both in [0, 1].
 

@@ -65,7 +65,7 @@ class ClothSolver(ClothLaunches):
         topology: The cloth's elements.
         material: A `nuno.materials.Cloth`.
         positions: (worlds, n, 3) float [m].
-        velocities: (worlds, n, 3) float [m/s].
+        velocities: (worlds, n, 3) float [m/s]; None leaves all at zero until ``load_state``.
         device: "cpu" or "cuda:0" ...
         gravity: (3,) [m/s2].
         frame_rate: Frames a second.
@@ -86,7 +86,7 @@ class ClothSolver(ClothLaunches):
         topology: ClothTopology,
         material: Cloth,
         positions: np.ndarray,
-        velocities: np.ndarray,
+        velocities: np.ndarray | None,
         *,
         device: str = "cpu",
         gravity: Sequence[float] = (0.0, 0.0, -9.81),

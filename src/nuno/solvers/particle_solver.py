@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -60,10 +61,11 @@ class ParticleSolver(ParticleState):
         """Return True if worlds by block groups are quicker than by a block each, or if they fit no block."""
         raise NotImplementedError
 
-    def _start(self, positions: np.ndarray, velocities: np.ndarray) -> None:
-        """Set the first state; nothing acts yet."""
+    def _start(self, positions: np.ndarray, velocities: np.ndarray | None) -> None:
+        """Set the first state, or with velocities None wait for ``load_state``; nothing acts yet."""
         self.last_dt: Any = 1.0  # of the last run [s], one or (worlds,)
-        self.set_state(positions, velocities)
+        if velocities is not None:
+            self.set_state(positions, velocities)
         self.set_colliders(None)
         self.set_grips(())
         self.set_forces(None)
@@ -85,20 +87,8 @@ class ParticleSolver(ParticleState):
 
     def set_colliders(self, colliders: ShapeTables | None) -> None:
         """The static shapes that the body meets; None for none."""
-        if colliders is None:
-            shapes = Shapes()
-            shapes.count = shapes.stride = shapes.mesh_stride = shapes.pose_stride = 0
-            for name in ("kind", "slot", "timing", "cell_ends", "cell_planes"):
-                setattr(shapes, name, wp.zeros(2, dtype=int, device=self.device))
-            for name in ("table", "pose", "shape_speed"):
-                setattr(shapes, name, wp.zeros(1, dtype=float, device=self.device))
-            shapes.mesh = wp.zeros(1, dtype=wp.uint64, device=self.device)
-            shapes.faces = shapes.corner_ends = wp.zeros(1, dtype=wp.vec2i, device=self.device)
-            shapes.planes = shapes.corners = shapes.hull_low = wp.zeros(1, dtype=wp.vec4, device=self.device)
-            shapes.hull_grid = wp.zeros(1, dtype=wp.vec4i, device=self.device)
-        else:
-            shapes = colliders.shapes
-        self._colliders, self.shapes = colliders, shapes
+        self._colliders = colliders
+        self.shapes = shapes = _no_shapes(self.device) if colliders is None else colliders.shapes
         self._size.shape_list = 1 + 2 * max(1, int(shapes.count))
         self._size.feature_shapes = len(self._surface.feature_colour) + 2 * max(1, int(shapes.count)) + 1
         self.state.shape_list, self.state.feature_shapes = (
@@ -113,8 +103,7 @@ class ParticleSolver(ParticleState):
         self._pushed = forces is not None
         if forces is None:
             self._size.forces = 1
-            for name in ("fx", "fy", "fz"):
-                setattr(s, name, wp.zeros(self.group_count, dtype=self._number, device=self.device))
+            s.fx = s.fy = s.fz = wp.zeros(self.group_count, dtype=self._number, device=self.device)
         else:
             self._size.forces = self.particle_count
             for k, name in enumerate(("fx", "fy", "fz")):
@@ -150,6 +139,10 @@ class ParticleSolver(ParticleState):
         self._grip_compliance = rows.compliance
         self._scaled_grip_compliance: dict[float, wp.array] = {}
         self._forget_launches()
+
+    def forget_grips(self) -> None:
+        """Be told that other grips will be set before anything runs, so that a state is loaded without these."""
+        self._grips = ()
 
     def grip_forces(self) -> list[tuple[np.ndarray, np.ndarray]]:
         """Return what each point of each grip bore in the last frame, and the mass that it moves with.
@@ -261,6 +254,22 @@ class ParticleSolver(ParticleState):
         from nuno.state.pack import reset_clock
 
         reset_clock(self.state, self.group_count, self.device)
+
+
+@cache
+def _no_shapes(device: str) -> Shapes:
+    """Return tables of no shapes, which nobody writes to: all solvers of a device begin with the same."""
+    shapes = Shapes()
+    shapes.count = shapes.stride = shapes.mesh_stride = shapes.pose_stride = 0
+    for name in ("kind", "slot", "timing", "cell_ends", "cell_planes"):
+        setattr(shapes, name, wp.zeros(2, dtype=int, device=device))
+    for name in ("table", "pose", "shape_speed"):
+        setattr(shapes, name, wp.zeros(1, dtype=float, device=device))
+    shapes.mesh = wp.zeros(1, dtype=wp.uint64, device=device)
+    shapes.faces = shapes.corner_ends = wp.zeros(1, dtype=wp.vec2i, device=device)
+    shapes.planes = shapes.corners = shapes.hull_low = wp.zeros(1, dtype=wp.vec4, device=device)
+    shapes.hull_grid = wp.zeros(1, dtype=wp.vec4i, device=device)
+    return shapes
 
 
 def substeps_of(duration: float, frame: float, substeps: int) -> int:

@@ -78,7 +78,7 @@ class SoftSolver(ParticleSolver):
         topology: The body's elements.
         material: A `nuno.materials.Soft`, whose elements are the tetrahedra.
         positions: (worlds, n, 3) float [m].
-        velocities: (worlds, n, 3) float [m/s].
+        velocities: (worlds, n, 3) float [m/s]; None leaves all at zero until ``load_state``.
         device: "cpu" or "cuda:0" ...
         gravity: (3,) [m/s2].
         frame_rate: Frames a second.
@@ -102,7 +102,7 @@ class SoftSolver(ParticleSolver):
         topology: SoftTopology,
         material: Soft,
         positions: np.ndarray,
-        velocities: np.ndarray,
+        velocities: np.ndarray | None,
         *,
         device: str = "cpu",
         gravity: Sequence[float] = (0.0, 0.0, -9.81),
