@@ -36,7 +36,7 @@ LIFTED = 5e-3
 class StrainSensors(Sensors):
     """Sensors that are asked for no more than what strains a robot without dynamics."""
 
-    _known: tuple[Any, ...] = ()  # how it moved when nothing bore on it last, the ground, and what came of it
+    _unloaded: tuple[Any, ...] = ()  # how it moved when nothing bore on it last, the ground, and what came of it
 
     def strain(self, state: RobotState) -> tuple[np.ndarray, np.ndarray | None]:
         """Return of ``read`` torques (n,) [N m; N] and zero moment point (2,) [m], None where no foot stands.
@@ -44,13 +44,13 @@ class StrainSensors(Sensors):
         Args:
             state: How the robot moves, at the time that the world has now. Its arrays are never written to.
         """
-        loads, known = () if self._loads is None else self._loads.read(), self._known
+        loads, before = () if self._loads is None else self._loads.read(), self._unloaded
         motion = (state.q, state.v, state.a)
-        if known and not loads and known[1] == self.ground and all(map(is_, known[0], motion)):
-            torques, point = known[2]
+        if before and not loads and before[1] == self.ground and all(map(is_, before[0], motion)):
+            torques, point = before[2]
             return torques, point
         torques, _, point, _ = self._balance(state, None)
-        self._known = () if loads else (motion, self.ground, (torques.copy(), point))
+        self._unloaded = () if loads else (motion, self.ground, (torques.copy(), point))
         return torques, point
 
 
