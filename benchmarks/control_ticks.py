@@ -5,7 +5,7 @@
 OTHER is the src folder of another checkout (git worktree add ../other COMMIT). A tick is what the world asks of the
 robot in a frame (``begin_frame`` and ``end_frame``), without the frame, in processor time. Of each process the median
 and the mean of its ticks are taken: every thirtieth tick looks at torques and balance, which only the mean has. Nobody
-reads the robot's state or sensors. Of the processes their medians and their least.
+reads the robot's state or sensors. Of the processes their medians and their least, and the medians of ratios by turns.
 """
 
 from __future__ import annotations
@@ -131,9 +131,12 @@ def main() -> None:
     for scene, own in found.items():
         (a, means_a), (b, means_b) = (tuple(zip(*own[name], strict=True)) for name in ("before", "now"))
         middle = [statistics.median(row) for row in (a, b, means_a, means_b)]
+        ratio, ratio_of_means = (
+            statistics.median(y / x for x, y in zip(*pair, strict=True)) for pair in ((a, b), (means_a, means_b))
+        )
         print(
-            f"| {scene} | {middle[0]:.4f} | {middle[1]:.4f} | {middle[1] / middle[0]:.2f} | {min(a):.4f} | "
-            f"{min(b):.4f} | {middle[2]:.4f} | {middle[3]:.4f} | {middle[3] / middle[2]:.2f} |"
+            f"| {scene} | {middle[0]:.4f} | {middle[1]:.4f} | {ratio:.2f} | {min(a):.4f} | "
+            f"{min(b):.4f} | {middle[2]:.4f} | {middle[3]:.4f} | {ratio_of_means:.2f} |"
         )
     if options.json:
         options.json.write_text(json.dumps(found, indent=1))

@@ -153,3 +153,22 @@ def test_a_look_finds_what_the_sensors_tell():
     told = reading.read(robot.state())
     torques, point = noting.strain(robot.state())
     assert torques.tobytes() == told.torques.tobytes() and point.tobytes() == told.zero_moment_point.tobytes()
+
+
+def test_a_robot_at_rest_on_which_nothing_bears_is_worked_out_once(monkeypatch):
+    """However often it is looked at, beside a towel that falls; anew when it moves, and when it is touched."""
+    worked_out, own = [], StrainSensors._balance
+    monkeypatch.setattr(StrainSensors, "_balance", lambda *given: worked_out.append(1) or own(*given))
+    robot = make()
+    towel = robot.world.add(nuno.sheet((0.1, 0.1), cells=(3, 3), position=(2.0, 0.0, 1.0)))
+    robot.world.attach(towel, nuno.Cloth.preset("towel"))
+    robot.sleep(3.0)
+    assert len(worked_out) == 1
+    robot.angle_vector({"arm_left_4_joint": -1.0}, 1.0)
+    robot.sleep(1.0)
+    assert len(worked_out) > 1
+    robot.sleep(1.0)
+    before = len(worked_out)
+    in_the_hand(robot, 1.0)
+    robot.sleep(LOOK)
+    assert len(worked_out) >= before + 2
