@@ -120,6 +120,7 @@ def judged(
         "scores": result.scores.tolist(),
         "mistakes": [[h.mistake for h in batch.discretisation.hypotheses] for batch in trials.batches],
         "up_first": [[h.up_first for h in batch.discretisation.hypotheses] for batch in trials.batches],
+        "self_contact": [batch.discretisation.self_contact for batch in trials.batches],
     }  # fmt: skip
     arrays = {f"stage{k}": packed(c) for k, c in enumerate(trials.comparisons)}
     for k, of_stage in enumerate(getattr(trials, "reflected", ())):

@@ -5,24 +5,33 @@ from __future__ import annotations
 from dataclasses import replace
 
 from nuno.estimate.coming_to_rest import SETTLE_SECONDS
-from nuno.estimate.hypotheses import DISCRETISATIONS, Discretisation, hypotheses_with
+from nuno.estimate.hypotheses import DISCRETISATIONS, OF_OUTLINES, Discretisation, hypotheses_with
 
-NAMES = ("now", "more", "limp", "weaves", "fine", "coarse")
+NAMES = ("now", "short", "free", "free-up", "outlines-free", "more", "limp", "weaves", "fine", "coarse")
+
+SPARED = 0.03
+"""Of the probability that a stage may leave out."""
 
 
 def stages_named(name: str) -> tuple[Discretisation, ...] | None:
     """Return stages; None of those that there are.
 
     Args:
-        name: "now"; "more": as before that, with more candidates in the last three stages, where cloths take up to
-            2.5 s to come to rest, and reflected futures count, too; "limp": as now, with the limpest guesses on the
-            coarser mesh; "weaves": as "more", with a stage of a finer, stiffer weave before the last one, still more
-            candidates in those before, and the last one on the mesh of these; "fine": as before that, with the early
-            stages on that mesh too, and ten weaves; "coarse": as now with all later stages on the early ones' mesh, and
-            those on a still coarser one.
+        name: "now"; "short": as now, with 1.5 s for coming to rest in all and without what just exceeds a group of
+            lanes; "free": as that, with a first stage whose cloths pass through themselves, and the usual first one
+            only on those that hold 98 % then; "free-up": and the same of the hands that went up first; "outlines-free":
+            as "free", of a cloth that is taken by its outline, with the last stages of rectangles; "more": as before
+            "now", with more candidates in the last three stages, where cloths take up to 2.5 s to come to rest, and
+            reflected futures count, too; "limp": as now, with the limpest guesses on the coarser mesh; "weaves": as
+            "more", with a stage of a finer, stiffer weave before the last one, still more candidates in those before,
+            and the last one on the mesh of these; "fine": as before that, with the early stages on that mesh too, and
+            ten weaves; "coarse": as now with all later stages on the early ones' mesh, and those on a still coarser
+            one.
     """
     if name == "now":
         return None
+    if name in ("short", "free", "free-up", "outlines-free"):
+        return _free(name)
     first, second, third = DISCRETISATIONS[:3]
     fourth, fifth, last = later = tuple(
         replace(stage, best=best, settle_seconds=SETTLE_SECONDS, reflects=True)
@@ -52,3 +61,16 @@ def stages_named(name: str) -> tuple[Discretisation, ...] | None:
         first, second, replace(third, share_if_poor=1.0), replace(fourth, best=16), replace(fifth, best=8),
         Discretisation(25, 20, weaves, best=5, any_way=True), replace(last, cells=20, substeps=14),
     )  # fmt: skip
+
+
+def _free(name: str) -> tuple[Discretisation, ...]:
+    """Stages that leave out what costs a group of lanes, of which some let cloths pass through themselves."""
+    early = OF_OUTLINES[:3] if name == "outlines-free" else DISCRETISATIONS[:3]
+    first, second, third, *later = (
+        replace(stage, settle_seconds=1.5, spares=SPARED) for stage in (*early, *DISCRETISATIONS[3:])
+    )
+    if name == "short":
+        return (first, second, third, *later)
+    third = replace(third, self_contact=name != "free-up")
+    free = replace(early[0], self_contact=False)
+    return (free, replace(first, best=36, share=0.98), second, third, *later)

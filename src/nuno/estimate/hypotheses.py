@@ -60,6 +60,11 @@ class Discretisation:
         settle_seconds: At most so long its cloths may take to come to rest in the hand [s].
         reflects: Whether its futures, reflected, count for candidates that it passes over
             (`nuno.estimate.mirrored`).
+        self_contact: Whether parts of its cloths touch each other. Those that pass through themselves take a quarter
+            to a half of the time; no estimate ends with such a stage.
+        share: The plausible candidates together hold so much of the probability; None is
+            `nuno.estimate.ranking.SHARE`.
+        spares: Of the probability it may leave out where its worlds are a group of lanes fewer then, on a CPU.
     """
 
     cells: int
@@ -70,6 +75,9 @@ class Discretisation:
     any_way: bool = False
     settle_seconds: float = SETTLE_SECONDS
     reflects: bool = True
+    self_contact: bool = True
+    share: float | None = None
+    spares: float = 0.0
 
     def with_up_first(self, share: float) -> Discretisation:
         """The same with a ``share`` of the guesses, 0 to 1, going up first, evenly spread; those that do still do."""

@@ -11,6 +11,7 @@ import numpy as np
 from nuno.camera.cloth_outline import ClothOutline
 from nuno.camera.rectangle import ClothRectangle
 from nuno.errors import EstimationError
+from nuno.estimate.coming_to_rest import groups
 from nuno.estimate.doubt import FAIRLY, doubted, misfit, oddities
 from nuno.estimate.futures import Futures, imagine_picks
 from nuno.estimate.hand_error import GROSS_SHARE
@@ -20,10 +21,11 @@ from nuno.estimate.lift_prior import log_prior_of_start, log_priors_of_ways
 from nuno.estimate.mirrored import Mirrored, mirrored
 from nuno.estimate.pick_settings import PickSettings
 from nuno.estimate.pick_sight import masks_of_turned, score_futures
-from nuno.estimate.ranking import Comparison, Ranked
+from nuno.estimate.ranking import SHARE, Comparison, Ranked
 from nuno.estimate.seeing import IMAGE_SCALE, Seen
 from nuno.estimate.together import Ahead, has_room
 from nuno.kernels.compile_watch import Stages
+from nuno.numbers.lanes import LANES
 from nuno.world.progress import with_bar
 
 
@@ -50,16 +52,20 @@ class PickTrials:
     reflected: Sequence[list[Comparison]] = ()
 
     def best_match(self, candidate: int, score: str) -> tuple[int, int, int]:
-        """Return the batch, the world in it, and its turn's number, in which a candidate looks most like the image."""
-        found: list[tuple[float, int, int, int]] = []
+        """Return the batch, the world in it, and its turn's number, in which a candidate looks most like the image.
+
+        Those whose cloth passes through itself count only where there are no others.
+        """
+        found: list[tuple[bool, float, int, int, int]] = []
         for k, comparison in enumerate(self.comparisons):
             at = np.nonzero(comparison.candidates == candidate)[0]
             if len(at):
                 error = comparison.error(score)[..., at[0]]
                 turn, guess = np.unravel_index(int(error.argmin()), error.shape)
                 world = int(guess) * len(comparison.candidates) + int(at[0])
-                found.append((float(error[turn, guess]), k, world, int(turn)))
-        return min(found)[1:]
+                crosses = not self.batches[k].discretisation.self_contact
+                found.append((crosses, float(error[turn, guess]), k, world, int(turn)))
+        return min(found)[2:]
 
     def masks(self, settings: PickSettings) -> np.ndarray:
         """Return (k, h, w) bool, every candidate's silhouette where it looks most like the image."""
@@ -123,7 +129,10 @@ def try_picks(
         if ranked is not None and wider is not None:
             chosen = ranked.plausible(len(uv), wider)
         elif ranked is not None and discretisation.best is not None:
-            chosen = ranked.plausible(discretisation.best)
+            share = SHARE if discretisation.share is None else discretisation.share
+            chosen = ranked.plausible(discretisation.best, share)
+        if ranked is not None and ahead is None:
+            chosen = in_fewer_groups(chosen, ranked, discretisation)
         # what is imagined ahead is of the stages after this one, too, which look at fewer candidates
         stages_ahead = meshes[k : k + 1] if wider is not None else meshes[k:]
         futures: Futures | None = None if ahead is None else ahead.part(stages_ahead, chosen)
@@ -143,7 +152,7 @@ def try_picks(
         batches.append(futures)
         ranked = doubted(_all(comparisons, reflected), settings.score, len(uv), prior)
         stages.end("compare")
-        if ranked.settled(settings.sure):
+        if discretisation.self_contact and ranked.settled(settings.sure):
             break
     assert ranked is not None
     if not np.isfinite(ranked.scores).any():
@@ -156,6 +165,16 @@ def try_picks(
     ranked = doubted(_all(comparisons, reflected), settings.score, len(uv), prior, reported)
     trusted = 1.0 if ranked.likely is None else float(ranked.likely[best])
     return PickTrials(comparisons, batches, ranked, seen, odd, trusted, reflected)
+
+
+def in_fewer_groups(chosen: np.ndarray, ranked: Ranked, discretisation: Discretisation) -> np.ndarray:
+    """Return the candidates (k,) int without the least likely, where few are too many for one group of lanes less."""
+    guesses, likely = len(discretisation.hypotheses), ranked.probabilities
+    fewer = (groups(len(chosen) * guesses) - 1) * LANES // guesses
+    if likely is None or not 2 <= fewer < len(chosen):
+        return chosen
+    order = chosen[np.argsort(-likely[chosen], kind="stable")]
+    return np.sort(order[:fewer]) if likely[order[fewer:]].sum() < discretisation.spares else chosen
 
 
 def _all(comparisons: list[Comparison], reflected: list[list[Comparison]]) -> list[Comparison]:
