@@ -17,10 +17,11 @@ def stages_named(name: str) -> tuple[Discretisation, ...] | None:
     """Return stages; None of those that there are.
 
     Args:
-        name: "now"; "short": as now, with 1.5 s for coming to rest in all and without what just exceeds a group of
-            lanes; "free": as that, with a first stage whose cloths pass through themselves, and the usual first one
-            only on those that hold 98 % then; "free-up": and the same of the hands that went up first; "outlines-free":
-            as "free", of a cloth that is taken by its outline, with the last stages of rectangles; "more": as before
+        name: "now"; "short": as now, with 1.5 s for coming to rest in all, without what just exceeds a group of lanes,
+            and with a hand that is seen to be elsewhere taken to be there; "free": as that, with a first stage whose
+            cloths pass through themselves, and the usual first one only on those that hold 98 % then; "free-up": and
+            the same of the hands that went up first; "outlines-free": as "free", of a cloth that is taken by its
+            outline, with the last stages of rectangles; "more": as before
             "now", with more candidates in the last three stages, where cloths take up to 2.5 s to come to rest, and
             reflected futures count, too; "limp": as now, with the limpest guesses on the coarser mesh; "weaves": as
             "more", with a stage of a finer, stiffer weave before the last one, still more candidates in those before,
@@ -67,10 +68,10 @@ def _free(name: str) -> tuple[Discretisation, ...]:
     """Stages that leave out what costs a group of lanes, of which some let cloths pass through themselves."""
     early = OF_OUTLINES[:3] if name == "outlines-free" else DISCRETISATIONS[:3]
     first, second, third, *later = (
-        replace(stage, settle_seconds=1.5, spares=SPARED) for stage in (*early, *DISCRETISATIONS[3:])
+        replace(stage, settle_seconds=1.5, spares=SPARED, asks_hand=True) for stage in (*early, *DISCRETISATIONS[3:])
     )
     if name == "short":
         return (first, second, third, *later)
     third = replace(third, self_contact=name != "free-up")
-    free = replace(early[0], self_contact=False)
+    free = replace(early[0], self_contact=False, asks_hand=True)
     return (free, replace(first, best=36, share=0.98), second, third, *later)

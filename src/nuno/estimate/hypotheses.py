@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -65,6 +66,8 @@ class Discretisation:
         share: The plausible candidates together hold so much of the probability; None is
             `nuno.estimate.ranking.SHARE`.
         spares: Of the probability it may leave out where its worlds are a group of lanes fewer then, on a CPU.
+        asks_hand: Of the first stage: whether all guesses after it take the hand's height for a mistake where the image
+            after shows cloth at the hand's place, or none near it (`elsewhere`).
     """
 
     cells: int
@@ -78,6 +81,7 @@ class Discretisation:
     self_contact: bool = True
     share: float | None = None
     spares: float = 0.0
+    asks_hand: bool = False
 
     def with_up_first(self, share: float) -> Discretisation:
         """The same with a ``share`` of the guesses, 0 to 1, going up first, evenly spread; those that do still do."""
@@ -87,6 +91,22 @@ class Discretisation:
             return self
         guesses = (replace(g, up_first=g.up_first or bool(up)) for g, up in zip(self.hypotheses, ups, strict=True))
         return replace(self, hypotheses=tuple(guesses))
+
+
+def elsewhere(stages: Sequence[Discretisation], mistake: float) -> tuple[Discretisation, ...]:
+    """Return stages to follow the first of some, where the hand is seen to be higher than it is told by a mistake.
+
+    The first one once more, and those after it; guesses that took it to be wrong the other way take it to be as told.
+
+    Args:
+        stages: The stages.
+        mistake: By how much it is higher [m]; below 0 it is lower.
+    """
+
+    def moved(guess: Hypothesis) -> Hypothesis:
+        return replace(guess, mistake=0.0 if guess.mistake * mistake < 0.0 else mistake)
+
+    return tuple(replace(stage, hypotheses=tuple(map(moved, stage.hypotheses))) for stage in stages)
 
 
 RIGIDITIES = (3e-5, 1e-4, 3e-4, 8e-4, 1.6e-3)

@@ -59,6 +59,12 @@ class Seen:
     pattern: Pattern | None
     warnings: tuple[str, ...] = ()
 
+    @property
+    def hand_is(self) -> int:
+        """1 where the hand is seen to be higher than it is told, -1 where lower, else 0."""
+        higher, lower = (any(w.startswith(begin) for w in self.warnings) for begin in (COVERED, AWAY))
+        return int(higher) - int(lower)
+
 
 def begin_to_see(
     before: np.ndarray | None, after: np.ndarray | None, mask_before: np.ndarray | None, mask_after: np.ndarray | None,
