@@ -12,6 +12,7 @@ from test_pick_settings import settings
 
 from nuno.camera.rectangle import ClothRectangle
 from nuno.estimate import pick_trials
+from nuno.estimate.hand_error import GROSS
 from nuno.estimate.hypotheses import Discretisation, Hypothesis
 from nuno.estimate.lift_prior import UP_FIRST
 from nuno.estimate.pick_trials import PickTrials, in_fewer_groups
@@ -28,22 +29,28 @@ STAGES = (
 ups: list[int] = []
 """How many guesses of each stage went up first in what was looked at last."""
 
+mistakes: list[set[float]] = []
+"""By how much the guesses of each stage took the hand to be higher by mistake."""
+
 reflected: list[int] = []
 """How many guesses the stages had whose futures were reflected then."""
 
 
 def looked_at(
-    monkeypatch: pytest.MonkeyPatch, chamfer: float, stages: tuple[Discretisation, ...] = STAGES, **changes: Any
-) -> list[int]:
+    monkeypatch: pytest.MonkeyPatch, chamfer: float, stages: tuple[Discretisation, ...] = STAGES, hand_is: int = 0,
+    **changes: Any,
+) -> list[int]:  # fmt: skip
     """How many candidates of six each stage looks at, where all fit alike but for two, which are ``chamfer`` px off."""
     numbers: list[int] = []
     ups.clear()
     reflected.clear()
+    mistakes.clear()
 
     def compare(futures: Any, chosen: np.ndarray, seen: Any, given: Any) -> Comparison:
         numbers.append(len(chosen))
         up_first = np.array([guess.up_first for guess in futures.discretisation.hypotheses])
         ups.append(int(up_first.sum()))
+        mistakes.append({guess.mistake for guess in futures.discretisation.hypotheses})
         shape = (len(given.turns), len(futures.discretisation.hypotheses), len(chosen))
         far = np.where(np.isin(chosen, (0, 1)), chamfer, 40.0)
         return Comparison(
@@ -61,7 +68,7 @@ def looked_at(
     monkeypatch.setattr(pick_trials, "imagine_picks", imagine)
     monkeypatch.setattr(pick_trials, "mirrored", reflect)
     given = settings(discretisations=stages, turns=(0.0,), learned=False, sideways=None, **changes)
-    seen: Any = SimpleNamespace(warnings=())
+    seen: Any = SimpleNamespace(warnings=(), hand_is=hand_is)
     pick_trials.try_picks(given, RECTANGLE, lambda: seen, Stages("imagine", "see", "compile", "compare"))
     return numbers
 
@@ -146,3 +153,18 @@ def test_the_best_match_touches_itself_where_one_does():
     trials = PickTrials([compared((0, 1), 1.0), compared((1,), 2.0)], batches, given, given)
     assert trials.best_match(1, "evidence") == (1, 0, 0)
     assert trials.best_match(0, "evidence") == (0, 0, 0)
+
+
+def test_a_hand_that_is_seen_to_be_elsewhere_is_taken_to_be_there(monkeypatch):
+    """All candidates are looked at again, with a hand 5 cm lower, also where one was sure with the hand as told."""
+    asking = (replace(STAGES[0], asks_hand=True), *STAGES[1:])
+    assert looked_at(monkeypatch, 1.5, stages=asking, hand_is=-1) == [6, 6, 2, 2]
+    assert mistakes == [{0.0}, {-GROSS}, {-GROSS}, {-GROSS}]
+    assert looked_at(monkeypatch, 1.5, stages=asking, hand_is=-1, sure=0.4) == [6, 6]
+    # not where it is as told, nobody asks, the way is known, or no evidence ranks
+    way = np.array([(0.0, 0.0, 0.0), (0.0, 0.0, 0.1), (0.0, 0.0, 0.2)])
+    assert looked_at(monkeypatch, 1.5, stages=asking) == looked_at(monkeypatch, 1.5, hand_is=-1) == [6, 2, 2]
+    looked_at(monkeypatch, 1.5, stages=asking, hand_is=-1, hand_path=way)
+    assert set.union(*mistakes) == {0.0}
+    looked_at(monkeypatch, 1.5, stages=asking, hand_is=-1, score="iou")
+    assert set.union(*mistakes) == {0.0}
