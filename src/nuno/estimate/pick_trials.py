@@ -173,7 +173,7 @@ def try_picks(
     best = int(ranked.order[0])
     batch, world, _ = PickTrials(comparisons, batches, ranked, seen).best_match(best, settings.score)
     guess = meshes[batch].hypotheses[world // len(comparisons[batch].candidates)]
-    odd = oddities(comparisons, best, settings.score, guess)
+    odd = oddities(comparisons, best, settings.score, guess, seen=hand_is != 0)
     reported = (*rectangle.warnings, *seen.warnings, *odd)
     if hand_is != 0 and guess.mistake != 0.0:  # what was seen of the hand is explained, and told once
         reported = tuple(warning for warning in reported if not warning.startswith((AWAY, COVERED)))
