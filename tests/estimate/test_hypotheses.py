@@ -66,8 +66,12 @@ def test_cells_are_multiples_of_the_grid() -> None:
 
 def test_outlines_are_looked_at_by_the_same_guesses_on_no_finer_meshes():
     """Triangles take longer than a grid: no stage is on a finer mesh than a rectangle's, the first on a coarser."""
-    assert [stage.hypotheses for stage in OF_OUTLINES] == [stage.hypotheses for stage in DISCRETISATIONS]
-    assert all(a.cells <= b.cells for a, b in zip(OF_OUTLINES, DISCRETISATIONS, strict=True))
+    free, *touching = OF_OUTLINES
+    assert [stage.hypotheses for stage in touching] == [stage.hypotheses for stage in DISCRETISATIONS]
+    assert all(a.cells <= b.cells for a, b in zip(touching, DISCRETISATIONS, strict=True))
+    # the first guesses once more, on every candidate, with cloths that pass through themselves
+    assert free == replace(DISCRETISATIONS[0], cells=free.cells, substeps=free.substeps, self_contact=False)
+    assert all(stage.self_contact for stage in touching) and touching[0].best is not None
     assert OF_OUTLINES[0].cells < DISCRETISATIONS[0].cells
 
 
