@@ -64,9 +64,10 @@ class Ended:
 def ended(case: Evidence) -> Ended:
     """Go through a case's stages as an estimate does."""
     comparisons = case.comparisons
+    touching = case.row.get("self_contact", [True] * len(comparisons))
     for k in range(1, len(comparisons) + 1):
         seen = [*comparisons[:k], *case.reflected(k)]
-        if doubted(seen, "evidence", COUNT, case.prior).settled(SURE):
+        if touching[k - 1] and doubted(seen, "evidence", COUNT, case.prior).settled(SURE):
             break
     ranked = rank(seen, "evidence", COUNT, case.prior)
     best = int(ranked.order[0])

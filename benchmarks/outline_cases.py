@@ -8,6 +8,8 @@ upper one is picked. ``python benchmarks/outline_cases.py --help`` tells how wel
 from __future__ import annotations
 
 import argparse
+import gc
+import itertools
 import json
 import logging
 import time
@@ -133,6 +135,7 @@ def _scene(shape: str, rng: np.random.Generator, picks: int, device: str, layers
 
 def judged(case: OutlineCase, device: str, stages: str) -> dict[str, Any]:
     """One case's line: how far the answer, the best of three and the nearest candidate are from the truth [m]."""
+    gc.collect()  # what the case before left takes a gigabyte before Python looks for it
     clock, others = time.process_time(), stages_named(stages)
     result = estimate_pick(
         None, None, camera=case.camera, table_height=case.table.height, table_half_extents=case.table.half_extents,
@@ -142,16 +145,16 @@ def judged(case: OutlineCase, device: str, stages: str) -> dict[str, Any]:
     places = result.rectangle.world_positions(result.fractions)  # type: ignore[attr-defined]
     away = np.linalg.norm(places - case.picked, axis=1)[result.order]
     return {
-        "shape": case.shape, "candidates": len(away), "distance": float(away[0]), "of_three": float(away[:3].min()),
-        "nearest": float(away.min()), "rank": int(away.argmin()) + 1, "confidence": result.confidence,
-        "cpu_s": round(time.process_time() - clock, 1),
+        "shape": case.shape, "stages": stages, "candidates": len(away), "distance": float(away[0]),
+        "of_three": float(away[:3].min()), "nearest": float(away.min()), "rank": int(away.argmin()) + 1,
+        "confidence": result.confidence, "cpu_s": round(time.process_time() - clock, 1),
     }  # fmt: skip
 
 
-def scene(shape: str, picks: int, seed: int, device: str, layers: int, stages: str) -> list[dict[str, Any]]:
-    """The lines of a scene's cases."""
+def scene(shape: str, picks: int, seed: int, device: str, layers: int, stages: list[str]) -> list[dict[str, Any]]:
+    """The lines of a scene's cases, each by all the stages by turns."""
     made = generate((shape,), picks, seed, device, layers)
-    return [judged(case, device, stages) | {"seed": seed} for case in made]
+    return [judged(case, device, name) | {"seed": seed} for case in made for name in stages]
 
 
 def main() -> None:
@@ -162,7 +165,7 @@ def main() -> None:
     parser.add_argument("--picks", type=int, default=1, help="of each scene")
     parser.add_argument("--seed", type=int, default=9000)
     parser.add_argument("--layers", type=int, default=1, choices=[1, 2], help="of garments that have two")
-    parser.add_argument("--stages", choices=NAMES, default="now", help="of pick_stages.py")
+    parser.add_argument("--stages", nargs="+", choices=NAMES, default=["now"], help="of pick_stages.py")
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--jobs", type=int, default=1, help="processes, each on one core")
     parser.add_argument("--json", type=FilePath)
@@ -179,10 +182,10 @@ def main() -> None:
             print(row, flush=True)
         if options.json:
             options.json.write_text(json.dumps(rows, indent=1))
-    for shape in (*options.shapes, None):
-        of = [r for r in rows if shape in (None, r["shape"])]
+    for name, shape in itertools.product(options.stages, (*options.shapes, None)):
+        of = [r for r in rows if r["stages"] == name and shape in (None, r["shape"])]
         if of:
-            print({"shape": shape or "all", **summary(of)})
+            print({"stages": name, "shape": shape or "all", **summary(of)})
 
 
 def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:

@@ -11,6 +11,7 @@ and a few arrays of evidence-*.npz (every future's scores at every pose, both ma
 from __future__ import annotations
 
 import argparse
+import gc
 import json
 import logging
 import multiprocessing
@@ -105,6 +106,7 @@ def judged(
     from nuno import estimate_pick
 
     kept.trials = None
+    gc.collect()  # what the case before left takes a gigabyte before Python looks for it
     started = time.perf_counter()
     result = estimate_pick(device=device, progress=False, sure=sure, **arguments)
     seconds = time.perf_counter() - started
@@ -120,6 +122,7 @@ def judged(
         "scores": result.scores.tolist(),
         "mistakes": [[h.mistake for h in batch.discretisation.hypotheses] for batch in trials.batches],
         "up_first": [[h.up_first for h in batch.discretisation.hypotheses] for batch in trials.batches],
+        "self_contact": [batch.discretisation.self_contact for batch in trials.batches],
     }  # fmt: skip
     arrays = {f"stage{k}": packed(c) for k, c in enumerate(trials.comparisons)}
     for k, of_stage in enumerate(getattr(trials, "reflected", ())):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from nuno.estimate.hand_error import GROSS
-from nuno.estimate.hypotheses import DISCRETISATIONS, FRICTIONS, OF_OUTLINES, cell_counts
+from nuno.estimate.hypotheses import DISCRETISATIONS, FRICTIONS, OF_OUTLINES, cell_counts, elsewhere
 
 
 def test_no_guess_is_made_twice() -> None:
@@ -66,6 +66,19 @@ def test_cells_are_multiples_of_the_grid() -> None:
 
 def test_outlines_are_looked_at_by_the_same_guesses_on_no_finer_meshes():
     """Triangles take longer than a grid: no stage is on a finer mesh than a rectangle's, the first on a coarser."""
-    assert [stage.hypotheses for stage in OF_OUTLINES] == [stage.hypotheses for stage in DISCRETISATIONS]
-    assert all(a.cells <= b.cells for a, b in zip(OF_OUTLINES, DISCRETISATIONS, strict=True))
+    free, *touching = OF_OUTLINES
+    assert [stage.hypotheses for stage in touching] == [stage.hypotheses for stage in DISCRETISATIONS]
+    assert all(a.cells <= b.cells for a, b in zip(touching, DISCRETISATIONS, strict=True))
+    # the first guesses once more, on every candidate, with cloths that pass through themselves
+    assert free == replace(DISCRETISATIONS[0], cells=free.cells, substeps=free.substeps, self_contact=False)
+    assert all(stage.self_contact for stage in touching) and touching[0].best is not None
     assert OF_OUTLINES[0].cells < DISCRETISATIONS[0].cells
+
+
+def test_a_hand_that_is_elsewhere_moves_all_guesses():
+    """Those that took it to be wrong the other way take it to be as told; as many, and the first stage once more."""
+    moved = elsewhere(DISCRETISATIONS, -GROSS)
+    assert [len(stage.hypotheses) for stage in moved] == [len(stage.hypotheses) for stage in DISCRETISATIONS]
+    for before, after in zip(DISCRETISATIONS, moved, strict=True):
+        for old, new in zip(before.hypotheses, after.hypotheses, strict=True):
+            assert new == replace(old, mistake=0.0 if old.mistake > 0.0 else -GROSS)

@@ -92,3 +92,22 @@ def test_cloth_in_place_of_the_hand_gets_a_warning():
     rim[12:18, 12:18] = False
     assert _uncovered(rim, ignored) == ()
     assert _uncovered(mask, np.zeros_like(mask)) == ()  # the hand is out of the image
+
+
+def test_where_the_cloth_begins_tells_whether_the_hand_is_higher_or_lower():
+    """Seen from the side: cloth 10 px and more under the hand says lower, beside it nothing, at the hand nothing."""
+    camera = Camera.look_at((-1.0, 0.0, 0.3), (0.0, 0.0, 0.3), fov=0.9, width=80, height=60)
+    rectangle = ClothRectangle(CORNERS, 0.2, 0.2, CORNERS.mean(axis=0), 0.0, 0.0)
+
+    def hand_is(rows, columns):
+        mask = np.zeros((60, 80), dtype=bool)
+        mask[rows, columns] = True
+        return begin_to_see(
+            None, None, None, mask, camera=camera, table=Table(0.0), rectangle=rectangle, hand=np.array((0, 0, 0.3)),
+            hand_radius=0.01, hidden=None, with_pattern=False, meanwhile=False,
+        )().hand_is  # fmt: skip
+
+    at_hand, under, beside = slice(28, 58), slice(44, 58), slice(25, 35)
+    assert hand_is(at_hand, slice(35, 45)) == 0
+    assert hand_is(under, slice(35, 45)) == -1
+    assert hand_is(beside, slice(55, 70)) == 0

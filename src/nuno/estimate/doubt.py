@@ -32,6 +32,8 @@ POOR = "even the best imagined pick looks little like the image after"
 """How the warning of a bad fit begins."""
 ELSEWHERE = "the image after looks as if the hand were "
 """How a warning begins that the hand is told to be where it is not."""
+SEEN_ELSEWHERE = "by where the cloth begins in the image after, the hand is taken to be "
+"""The same where all guesses took it to be there (`nuno.estimate.hypotheses.elsewhere`)."""
 SHARES = {SQUARE: 0.0, UNEVEN: 0.0, POOR: 0.0, ELSEWHERE: 0.4, AWAY: 0.4, COVERED: 0.4, FOCAL: 0.1}
 """Of the broad probabilities, by how a warning begins, of what those before it left. A square or rough outline told
 nothing of answers (docs/reports/accuracy.md), and how badly the best future fits counts by itself."""
@@ -59,7 +61,9 @@ def misfit(comparisons: Sequence[Comparison], candidate: int) -> float:
     return min(found)
 
 
-def oddities(comparisons: Sequence[Comparison], candidate: int, score: str, guess: Hypothesis) -> tuple[str, ...]:
+def oddities(
+    comparisons: Sequence[Comparison], candidate: int, score: str, guess: Hypothesis, *, seen: bool = False
+) -> tuple[str, ...]:
     """Return warnings of how the best future fits; none where something else than evidence ranks.
 
     Args:
@@ -67,12 +71,13 @@ def oddities(comparisons: Sequence[Comparison], candidate: int, score: str, gues
         candidate: The best one.
         score: What ranks.
         guess: Of the future that fits best.
+        seen: Whether the image after shows that the hand is elsewhere.
     """
     if score not in EVIDENCE:
         return ()
     if guess.mistake != 0.0:
         return (
-            f"{ELSEWHERE}{100.0 * abs(guess.mistake):.0f} cm "
+            f"{SEEN_ELSEWHERE if seen else ELSEWHERE}{100.0 * abs(guess.mistake):.0f} cm "
             f"{'higher' if guess.mistake > 0.0 else 'lower'} than it is told to be: are hand, camera and table_height "
             "right?",
         )

@@ -142,6 +142,8 @@ def begin_picks(
 
     futures = world.imagine(len(numbers), engine=engine)
     body = futures.find(cloth.name)
+    if not discretisation.self_contact:
+        futures.ignore_contact(body, body)
     for static in ("table", "floor"):
         if any(b.name == static for b in futures.bodies):
             # the pair's coefficient is the geometric mean: with equal ones it is the hypothesis's

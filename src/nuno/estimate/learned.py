@@ -26,6 +26,7 @@ from nuno.estimate.hypotheses import Hypothesis
 from nuno.estimate.outline_net import SIZE, log_ratios
 from nuno.estimate.pick_sight import masks_of_turned
 from nuno.estimate.ranking import Comparison
+from nuno.numbers.blas_threads import one_blas_thread
 
 HAND_MADE_SHARE = 0.7
 LEARNED_SHARE = 1.0
@@ -66,7 +67,8 @@ class Outline:
         shown = (np.flatnonzero(weights.any(axis=0)) for weights in (self.down, self.across))
         rows, columns = (slice(k[0], k[-1] + 1) for k in shown)
         visible = (masks[:, rows, columns] & ~self.hidden[rows, columns]).astype(np.float32)
-        return np.asarray(self.down[:, rows] @ visible @ self.across[:, columns].T)
+        with one_blas_thread():
+            return np.asarray(self.down[:, rows] @ visible @ self.across[:, columns].T)
 
 
 def outline_of(mask: np.ndarray, hidden: np.ndarray, camera: Camera, hand: ArrayLike) -> Outline | None:
@@ -96,7 +98,9 @@ def outline_of(mask: np.ndarray, hidden: np.ndarray, camera: Camera, hand: Array
     away = (np.asarray(small.project(hand)) - middle) / side
     pixel = side / SIZE
     place = (*away, 50.0 * pixel * float(small.depth_of(hand)) / small.fx, pixel * FULL_WIDTH / WIDTH / 5.0)
-    return Outline(small, covered, across, down, down @ share @ across.T, np.array(place))
+    with one_blas_thread():
+        picture = down @ share @ across.T
+    return Outline(small, covered, across, down, picture, np.array(place))
 
 
 def _samples(middle: float, side: float, count: int) -> np.ndarray:

@@ -9,12 +9,10 @@ from __future__ import annotations
 
 from functools import lru_cache
 from importlib.resources import files
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from threadpoolctl import ThreadpoolController
+from nuno.numbers.blas_threads import one_blas_thread
 
 SIZE = 64
 """[px] Sides of the pictures it looks at."""
@@ -47,21 +45,12 @@ def log_ratios(real: np.ndarray, imagined: np.ndarray, scalars: np.ndarray) -> n
     """
     net = weights()
     seen = _rounded(real)[None, ..., None]
-    # threads that share such small products wait for each other longer than one takes, if others keep the cores busy
-    with _products().limit(limits=1, user_api="blas"):
+    with one_blas_thread():
         found = [
             _forward(net, seen, _rounded(imagined[k : k + AT_ONCE])[..., None], scalars[k : k + AT_ONCE])
             for k in range(0, len(imagined), AT_ONCE)
         ]
     return np.concatenate([np.zeros(0), *found])
-
-
-@lru_cache(maxsize=1)
-def _products() -> ThreadpoolController:
-    """The controller of how many threads multiply matrices."""
-    from threadpoolctl import ThreadpoolController
-
-    return ThreadpoolController()
 
 
 def _forward(net: dict[str, np.ndarray], seen: np.ndarray, imagined: np.ndarray, scalars: np.ndarray) -> np.ndarray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -11,19 +12,21 @@ import numpy as np
 from nuno.camera.cloth_outline import ClothOutline
 from nuno.camera.rectangle import ClothRectangle
 from nuno.errors import EstimationError
+from nuno.estimate.coming_to_rest import groups
 from nuno.estimate.doubt import FAIRLY, doubted, misfit, oddities
 from nuno.estimate.futures import Futures, imagine_picks
-from nuno.estimate.hand_error import GROSS_SHARE
-from nuno.estimate.hypotheses import DISCRETISATIONS, OF_OUTLINES, Discretisation
+from nuno.estimate.hand_error import GROSS, GROSS_SHARE, SEEN_SHARE
+from nuno.estimate.hypotheses import DISCRETISATIONS, OF_OUTLINES, Discretisation, elsewhere
 from nuno.estimate.learned import Outline, correction, outline_of
 from nuno.estimate.lift_prior import log_prior_of_start, log_priors_of_ways
 from nuno.estimate.mirrored import Mirrored, mirrored
 from nuno.estimate.pick_settings import PickSettings
 from nuno.estimate.pick_sight import masks_of_turned, score_futures
-from nuno.estimate.ranking import Comparison, Ranked
-from nuno.estimate.seeing import IMAGE_SCALE, Seen
+from nuno.estimate.ranking import SHARE, Comparison, Ranked
+from nuno.estimate.seeing import AWAY, COVERED, IMAGE_SCALE, Seen
 from nuno.estimate.together import Ahead, has_room
 from nuno.kernels.compile_watch import Stages
+from nuno.numbers.lanes import LANES
 from nuno.world.progress import with_bar
 
 
@@ -50,16 +53,20 @@ class PickTrials:
     reflected: Sequence[list[Comparison]] = ()
 
     def best_match(self, candidate: int, score: str) -> tuple[int, int, int]:
-        """Return the batch, the world in it, and its turn's number, in which a candidate looks most like the image."""
-        found: list[tuple[float, int, int, int]] = []
+        """Return the batch, the world in it, and its turn's number, in which a candidate looks most like the image.
+
+        Those whose cloth passes through itself count only where there are no others.
+        """
+        found: list[tuple[bool, float, int, int, int]] = []
         for k, comparison in enumerate(self.comparisons):
             at = np.nonzero(comparison.candidates == candidate)[0]
             if len(at):
                 error = comparison.error(score)[..., at[0]]
                 turn, guess = np.unravel_index(int(error.argmin()), error.shape)
                 world = int(guess) * len(comparison.candidates) + int(at[0])
-                found.append((float(error[turn, guess]), k, world, int(turn)))
-        return min(found)[1:]
+                crosses = not self.batches[k].discretisation.self_contact
+                found.append((crosses, float(error[turn, guess]), k, world, int(turn)))
+        return min(found)[2:]
 
     def masks(self, settings: PickSettings) -> np.ndarray:
         """Return (k, h, w) bool, every candidate's silhouette where it looks most like the image."""
@@ -109,7 +116,12 @@ def try_picks(
     path_given = settings.hand_path is not None
     # an outline's triangles take several times as long as a rectangle's grid, and it is no image of itself
     is_open = settings.with_evidence and not path_given and not is_outline
-    for k in with_bar(range(len(meshes)), "imagining", settings.progress, "mesh"):
+    hand_is = 0
+    for k in chain(
+        with_bar(range(len(meshes)), "imagining", settings.progress, "mesh"), (len(meshes), len(meshes) + 1)
+    ):
+        if k == len(meshes):
+            break
         if meshes[k].any_way and ranked is not None and not path_given:
             # once for all that follow, so that a device may imagine them together
             meshes[k:] = [
@@ -123,7 +135,10 @@ def try_picks(
         if ranked is not None and wider is not None:
             chosen = ranked.plausible(len(uv), wider)
         elif ranked is not None and discretisation.best is not None:
-            chosen = ranked.plausible(discretisation.best)
+            share = SHARE if discretisation.share is None else discretisation.share
+            chosen = ranked.plausible(discretisation.best, share)
+        if ranked is not None and ahead is None and discretisation.best is not None:
+            chosen = in_fewer_groups(chosen, ranked, discretisation)
         # what is imagined ahead is of the stages after this one, too, which look at fewer candidates
         stages_ahead = meshes[k : k + 1] if wider is not None else meshes[k:]
         futures: Futures | None = None if ahead is None else ahead.part(stages_ahead, chosen)
@@ -134,16 +149,23 @@ def try_picks(
         stages.end("see")
         if k == 0 and settings.learned and settings.with_evidence:
             outline = outline_of(seen.mask, seen.hidden, settings.camera, hand)
-        comparisons.append(_compared(futures, chosen, seen, settings, outline))
+        if k == 0 and discretisation.asks_hand and settings.with_evidence and not path_given and seen.hand_is != 0:
+            hand_is = seen.hand_is
+            meshes[1:] = elsewhere(meshes, hand_is * GROSS)
+        share_of_mistakes = GROSS_SHARE if hand_is == 0 else SEEN_SHARE
+        comparisons.append(_compared(futures, chosen, seen, settings, outline, share_of_mistakes))
         others = (
             mirrored(futures, chosen, uv, rectangle, table, hand, settings.hand_std)
             if is_open and discretisation.reflects else None
         )  # fmt: skip
-        reflected.append([] if others is None else _of_each_kind(others, seen, settings, outline))
+        reflected.append(
+            [] if others is None else _of_each_kind(others, seen, settings, outline, share_of_mistakes)
+        )  # fmt: skip
         batches.append(futures)
         ranked = doubted(_all(comparisons, reflected), settings.score, len(uv), prior)
         stages.end("compare")
-        if ranked.settled(settings.sure):
+        may_end = discretisation.self_contact and (k > 0 or hand_is == 0)
+        if may_end and ranked.settled(settings.sure):
             break
     assert ranked is not None
     if not np.isfinite(ranked.scores).any():
@@ -151,11 +173,23 @@ def try_picks(
     best = int(ranked.order[0])
     batch, world, _ = PickTrials(comparisons, batches, ranked, seen).best_match(best, settings.score)
     guess = meshes[batch].hypotheses[world // len(comparisons[batch].candidates)]
-    odd = oddities(comparisons, best, settings.score, guess)
+    odd = oddities(comparisons, best, settings.score, guess, seen=hand_is != 0)
     reported = (*rectangle.warnings, *seen.warnings, *odd)
+    if hand_is != 0 and guess.mistake != 0.0:  # what was seen of the hand is explained, and told once
+        reported = tuple(warning for warning in reported if not warning.startswith((AWAY, COVERED)))
     ranked = doubted(_all(comparisons, reflected), settings.score, len(uv), prior, reported)
     trusted = 1.0 if ranked.likely is None else float(ranked.likely[best])
     return PickTrials(comparisons, batches, ranked, seen, odd, trusted, reflected)
+
+
+def in_fewer_groups(chosen: np.ndarray, ranked: Ranked, discretisation: Discretisation) -> np.ndarray:
+    """Return the candidates (k,) int without the least likely, where few are too many for one group of lanes less."""
+    guesses, likely = len(discretisation.hypotheses), ranked.probabilities
+    fewer = (groups(len(chosen) * guesses) - 1) * LANES // guesses
+    if likely is None or not 2 <= fewer < len(chosen):
+        return chosen
+    order = chosen[np.argsort(-likely[chosen], kind="stable")]
+    return np.sort(order[:fewer]) if likely[order[fewer:]].sum() < discretisation.spares else chosen
 
 
 def _all(comparisons: list[Comparison], reflected: list[list[Comparison]]) -> list[Comparison]:
@@ -163,21 +197,25 @@ def _all(comparisons: list[Comparison], reflected: list[list[Comparison]]) -> li
     return [*comparisons, *(comparison for of_mesh in reflected for comparison in of_mesh)]
 
 
-def _of_each_kind(others: Mirrored, seen: Seen, settings: PickSettings, outline: Outline | None) -> list[Comparison]:
+def _of_each_kind(
+    others: Mirrored, seen: Seen, settings: PickSettings, outline: Outline | None, share_of_mistakes: float
+) -> list[Comparison]:
     """Compare reflected futures, those of each reflection by themselves."""
-    together = replace(_compared(others, others.chosen, seen, settings, outline), weights=others.weights)
+    comparison = _compared(others, others.chosen, seen, settings, outline, share_of_mistakes)
+    together = replace(comparison, weights=others.weights)
     return [together.part(others.kinds == kind) for kind in np.unique(others.kinds)]
 
 
 def _compared(
-    futures: Futures, chosen: np.ndarray, seen: Seen, settings: PickSettings, outline: Outline | None
-) -> Comparison:
+    futures: Futures, chosen: np.ndarray, seen: Seen, settings: PickSettings, outline: Outline | None,
+    share_of_mistakes: float,
+) -> Comparison:  # fmt: skip
     """Compare futures of chosen candidates, with the network's correction, if it has a say, and unlikely mistakes."""
     comparison = compare(futures, chosen, seen, settings)
     if outline is not None:
         added = correction(outline, futures, comparison, settings.table, settings.hand)
         comparison = replace(comparison, correction=added)
-    return _weighed(comparison, futures.discretisation)
+    return _weighed(comparison, futures.discretisation, share_of_mistakes)
 
 
 def _fits_poorly(comparisons: list[Comparison], ranked: Ranked | None) -> bool:
@@ -185,13 +223,15 @@ def _fits_poorly(comparisons: list[Comparison], ranked: Ranked | None) -> bool:
     return ranked is not None and misfit(comparisons, int(ranked.order[0])) > FAIRLY
 
 
-def _weighed(comparison: Comparison, discretisation: Discretisation) -> Comparison:
-    """The comparison, with guesses that take the hand's place for a mistake as unlikely as they are."""
+def _weighed(comparison: Comparison, discretisation: Discretisation, share_of_mistakes: float) -> Comparison:
+    """The comparison, with guesses that take the hand's place for a mistake, or not, as likely as they are."""
     mistakes = np.array([hypothesis.mistake != 0.0 for hypothesis in discretisation.hypotheses])
-    if not mistakes.any():
+    expected = share_of_mistakes >= 0.5
+    if not expected and not mistakes.any():
         return comparison
     added = 0.0 if comparison.correction is None else comparison.correction
-    return replace(comparison, correction=added + np.log(np.where(mistakes, GROSS_SHARE, 1.0))[:, None])
+    others = 1.0 - share_of_mistakes if expected else 1.0
+    return replace(comparison, correction=added + np.log(np.where(mistakes, share_of_mistakes, others))[:, None])
 
 
 def _prior(settings: PickSettings, rectangle: ClothRectangle) -> np.ndarray:

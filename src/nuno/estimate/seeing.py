@@ -49,6 +49,7 @@ class Seen:
         coarse: The same at `TURNED_SCALE`.
         pattern: The cloth's pattern; None where it is not asked for, or too little is seen.
         warnings: What is odd about where the cloth is seen.
+        hand_is: 1 where the hand is seen to be higher than it is told, -1 where lower, else 0.
     """
 
     mask: np.ndarray
@@ -58,6 +59,7 @@ class Seen:
     coarse: tuple[Camera, Silhouette]
     pattern: Pattern | None
     warnings: tuple[str, ...] = ()
+    hand_is: int = 0
 
 
 def begin_to_see(
@@ -99,10 +101,11 @@ def begin_to_see(
         if with_pattern and before is not None and after is not None:
             colours = cloth_colours(before, mask_before, rectangle)
             pattern = find_pattern(colours, after, mask & ~ignored, rectangle, camera, hand)
-        odd = _oddities(mask, ignored) + _doubts(mask, doubt)
-        if mask_after is None and hidden is None:
-            odd += _uncovered(mask, ignored)
-        return Seen(mask, ignored, small, silhouette, coarse, pattern, odd)
+        away = _oddities(mask, ignored)
+        covered = _uncovered(mask, ignored) if mask_after is None and hidden is None else ()
+        hand_is = 1 if covered else -1 if away and _begins_below(mask, camera, hand) else 0
+        odd = away + _doubts(mask, doubt) + covered
+        return Seen(mask, ignored, small, silhouette, coarse, pattern, odd, hand_is)
 
     if not meanwhile:
         seen = look()
@@ -123,6 +126,14 @@ def _oddities(mask: np.ndarray, ignored: np.ndarray) -> tuple[str, ...]:
     if away <= max(float(np.sqrt(ignored.sum() / np.pi)), FAR_FROM_HAND):
         return ()
     return (f"{AWAY}{away:.0f} px away from the hand: does it hold the cloth?",)
+
+
+def _begins_below(mask: np.ndarray, camera: Camera, hand: np.ndarray) -> bool:
+    """Return True if the cloth (h, w) that is nearest to the hand (3,) [m] is seen under it, to 60 degrees."""
+    middle, below = camera.project(np.stack([hand, hand - (0.0, 0.0, 0.01)]))
+    away = np.argwhere(mask)[:, ::-1] - middle
+    nearest = away[np.linalg.norm(away, axis=1).argmin()]
+    return bool(nearest @ (below - middle) >= 0.5 * np.linalg.norm(nearest) * np.linalg.norm(below - middle))
 
 
 def _uncovered(mask: np.ndarray, ignored: np.ndarray) -> tuple[str, ...]:

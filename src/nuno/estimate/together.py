@@ -190,8 +190,11 @@ def alike(stages: Sequence[Discretisation]) -> tuple[Discretisation, ...]:
     first = stages[0]
     if first.best is None:
         return (first,)
-    same = (first.cells, first.substeps, first.any_way)
-    return (first, *(s for s in stages[1:] if s.best is not None and (s.cells, s.substeps, s.any_way) == same))
+
+    def kind(stage: Discretisation) -> tuple[int, int, bool, bool]:
+        return stage.cells, stage.substeps, stage.any_way, stage.self_contact
+
+    return (first, *(stage for stage in stages[1:] if stage.best is not None and kind(stage) == kind(first)))
 
 
 def imagine_together(
