@@ -2,9 +2,9 @@
 
 import warp as wp
 
-from nuno.coupled.articulated_inertia import Inertia, rest_of, seen_from
+from nuno.coupled.articulated_inertia import Inertia, rest_of
 from nuno.coupled.drive_constraints import angle_about, driven, wrapped
-from nuno.coupled.joint_constraints import ROUNDING, joint_left, joint_misfit
+from nuno.coupled.joint_constraints import ROUNDING, joint_left, misfit
 from nuno.coupled.joint_response import (
     BALL,
     DRIVES,
@@ -29,26 +29,22 @@ wrong however little that turns, see `nuno.coupled.joint_tree.PIVOTED`."""
 
 @wp.struct
 class Opening:
-    """Response of a joint of a tree to the body that carries it."""
+    """Response of a joint of a tree to the body that carries it, at the joint's point."""
 
-    carried: Inertia  # what that body feels of it
-    push: wp.mat33  # U, columns: forces,
-    twist: wp.mat33  # and torques
-    gives: wp.mat33  # D^-1
-    drive: wp.vec3  # u
-    along: wp.mat33  # S, columns: shifts,
-    about: wp.mat33  # and turns
-    shift: wp.vec3  # what it takes back of a wrong place,
+    push: wp.vec3  # U of a hinge or slider: a force,
+    twist: wp.vec3  # and a torque
+    gives: float  # D^-1; 0 where nothing is free
+    ball_gives: wp.mat33  # D^-1 of a ball joint
+    drive: float  # u
+    shift: wp.vec3  # what it takes back of a wrong place, and what it is driven by where that is given,
     turn: wp.vec3  # and of a wrong turn
     alone: int  # 1: what hangs on it follows nothing
-    whole: Inertia  # of what it carries, as seen from it
-    line: wp.vec3  # of a hinge or slider, the multiplier's shift and turn of its free direction:
-    spin: wp.vec3
-    inertia: float  # what a unit of way takes along it
+    inertia: float  # what a unit of way takes along a free direction
     slope: float  # stiffness of what drives it
     axis: wp.vec3  # where the substep began
     arm: wp.vec3  # to the joint, of what it carries
     other_arm: wp.vec3  # and of what carries it
+    reach: wp.vec3  # to the joint, from where the inertia of what carries it is taken
     start: float  # where it was along its free direction
     left: wp.vec3  # of a wrong place, and of a wrong turn, what may not be mended in the substep
     left_off: wp.vec3
@@ -64,12 +60,17 @@ class Trees:
     joint: wp.array(dtype=int)  # (count)
     carrier: wp.array(dtype=int)  # (count) the node that carries: a joint's place here, or count and a root's; -1: none
     flipped: wp.array(dtype=int)  # (count) 1 where it carries its own body's other
+    heir: wp.array(dtype=int)  # (count + roots) the last joint that a node carries, -1: none
+    next_heir: wp.array(dtype=int)  # (count) the one before that the same node carries
     root: wp.array(dtype=int)  # (roots) slot
     alone: wp.array(dtype=int)  # (lone)
-    node: wp.array(dtype=Inertia)  # (worlds * (count + roots)), at the centre of mass
+    node: wp.array(dtype=Inertia)  # (worlds * (count + roots)), at the joint's point, of roots at the centre of mass
+    carried: wp.array(dtype=Inertia)  # (worlds * count), what a carrier feels of it at the joint's point
     opening: wp.array(dtype=Opening)  # (worlds * count)
-    shift: wp.array(dtype=wp.vec3)  # (worlds * (count + roots)), of the centre of mass
+    shift: wp.array(dtype=wp.vec3)  # (worlds * (count + roots)), of where the node's inertia is taken
     turn: wp.array(dtype=wp.vec3)
+    pull: wp.array(dtype=wp.vec3)  # (worlds * (count + roots)), what joints bear of a pass, on the node's body,
+    twist: wp.array(dtype=wp.vec3)  # about its centre of mass
     stale: wp.array(dtype=int)  # (worlds * (count + roots)), whether the inertia of a node is to be added up anew
     changed: wp.array(dtype=int)  # (worlds * count), whether friction of it, or of what it carries, did in the pass
     wrong: wp.array(dtype=float)  # (worlds * count), how far each joint was from where it should be
@@ -113,24 +114,39 @@ def start_along(rigid: RigidState, joints: Joints, world: int, k: int, axis: wp.
     return start
 
 
+@wp.struct
+class Fit:
+    """How far a joint's frames are from each other."""
+
+    apart: wp.vec3  # places that should not be apart
+    off: wp.vec3  # turns that should not be
+    along: float  # of a hinge or slider, where it is along its free direction
+
+
 @wp.func
-def place_along(rigid: RigidState, joints: Joints, world: int, k: int, start: float):
-    """Return where a hinge or slider is along its free direction, which was at ``start``."""
+def fit_of(rigid: RigidState, joints: Joints, world: int, k: int, start: float):
+    """Return `joint_misfit`, and where a hinge or slider is along its free direction, which was at ``start``."""
     r = world * joints.count + k
     i = world * rigid.capacity + joints.slot[k]
+    kind = joints.kind[k]
+    z = wp.vec3(0.0, 0.0, 1.0)
     place, other_turn = other_frame_now(rigid, joints, world, k)
-    now = float(0.0)
-    if joints.kind[k] == HINGE:
-        now = start + wrapped(angle_about(other_turn, rigid.rotation[i] * joints.turn[r]) - start)
-    else:
-        now_axis = wp.quat_rotate(other_turn, wp.vec3(0.0, 0.0, 1.0))
-        now = wp.dot(now_axis, point_of(rigid, i, joints.place[r]) - place)
-    return now
+    axis = wp.quat_rotate(other_turn, z)
+    turn = rigid.rotation[i] * joints.turn[r]
+    made = Fit()
+    apart, off = misfit(kind, point_of(rigid, i, joints.place[r]) - place, turn, other_turn, axis)
+    made.apart = apart
+    made.off = off
+    if kind == HINGE:
+        made.along = start + wrapped(angle_about(other_turn, turn) - start)
+    if kind == SLIDER:
+        made.along = wp.dot(axis, point_of(rigid, i, joints.place[r]) - place)
+    return made
 
 
 @wp.func
 def begin_opening(rigid: RigidState, joints: Joints, trees: Trees, world: int, t: int, dt: float):
-    """Keep what of a joint stays as it is for a whole substep."""
+    """Keep what of a joint stays as it is for a whole substep; those of joints that carry it come before."""
     k = trees.joint[t]
     at = world * trees.count + t
     _i, _j, arm, other_arm = arms_of(rigid, joints, world, k)
@@ -140,6 +156,10 @@ def begin_opening(rigid: RigidState, joints: Joints, trees: Trees, world: int, t
     made.axis = axis
     made.arm = wp.where(trees.flipped[t] == 1, other_arm, arm)
     made.other_arm = wp.where(trees.flipped[t] == 1, arm, other_arm)
+    made.reach = made.other_arm
+    carrier = trees.carrier[t]
+    if carrier >= 0 and carrier < trees.count:
+        made.reach = made.other_arm - trees.opening[world * trees.count + carrier].arm
     made.left = left
     made.left_off = left_off
     if joints.kind[k] == HINGE or joints.kind[k] == SLIDER:
@@ -171,108 +191,113 @@ def open_joint(rigid: RigidState, joints: Joints, trees: Trees, world: int, t: i
     n = world * (trees.count + trees.roots) + t
     kind = joints.kind[k]
     sign = wp.where(trees.flipped[t] == 1, -1.0, 1.0)
-    unit = wp.identity(n=3, dtype=float)
-    first = wp.mat33(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    made = trees.opening[at]
-    if stale == 1:
-        made.whole = seen_from(trees.node[n], -made.arm)
-    else:
-        made.whole.force = trees.node[n].force
-        made.whole.torque = trees.node[n].torque + wp.cross(-made.arm, trees.node[n].force)
-    axis = made.axis
-    apart, off = joint_misfit(rigid, joints, world, k)
-    apart = apart - made.left
-    off = off - made.left_off
+    fit = fit_of(rigid, joints, world, k, trees.opening[at].start)
+    apart = fit.apart - trees.opening[at].left
+    off = fit.off - trees.opening[at].left_off
     i = world * rigid.capacity + joints.slot[k]
     rounding = ROUNDING * (1.0 + wp.length(rigid.position[i]))
     wrong = wp.max(wp.max(wp.length(apart) - rounding, wp.length(off) - ROTATION_ROUNDING), 0.0)
     anew = stale
-    if kind == HINGE:
-        rounding = ROTATION_ROUNDING
     limit = LIMITED * joints.limit[r] * dt * dt
     if wp.length(joints.pull[r]) > limit or wp.length(joints.twist[r]) > limit:
-        if made.alone == 0:
+        if trees.opening[at].alone == 0:
             anew = 1
-        made.alone = 1
-        shift, turn = rest_of(made.whole)
-        made.shift = shift
-        made.turn = turn
-        made.drive = wp.vec3(0.0, 0.0, 0.0)
-        made.carried.force = wp.vec3(0.0, 0.0, 0.0)
-        made.carried.torque = wp.vec3(0.0, 0.0, 0.0)
-        if anew == 1:
-            made.along = wp.mat33(0.0)
-            made.about = wp.mat33(0.0)
-            made.push = wp.mat33(0.0)
-            made.twist = wp.mat33(0.0)
-            made.gives = wp.mat33(0.0)
-            made.carried.a = wp.mat33(0.0)
-            made.carried.b = wp.mat33(0.0)
-            made.carried.c = wp.mat33(0.0)
-    else:
-        if made.alone == 1:
-            anew = 1
-        made.alone = 0
-        made.shift = -sign * apart
-        made.turn = -sign * off
-        free = wp.mat33(0.0)  # 1 on the diagonal for each free direction
-        stiff = wp.mat33(0.0)
-        aim = wp.vec3(0.0, 0.0, 0.0)
-        along = wp.mat33(0.0)
-        about = wp.mat33(0.0)
-        if kind == BALL:
-            free = unit
-            about = sign * unit
-        if kind == HINGE or kind == SLIDER:
-            line = wp.vec3(0.0, 0.0, 0.0)
-            spin = sign * axis
-            if kind == SLIDER:
-                line = sign * axis
-                spin = wp.vec3(0.0, 0.0, 0.0)
-            if stale == 1:
-                made.line = made.whole.a * line + made.whole.b * spin
-                made.spin = wp.transpose(made.whole.b) * line + made.whole.c * spin
-                made.inertia = wp.dot(line, made.line) + wp.dot(spin, made.spin)
-            inertia = made.inertia
-            pull = wp.dot(made.line, made.shift) + wp.dot(made.spin, made.turn)
-            pull = pull + wp.dot(line, made.whole.force) + wp.dot(spin, made.whole.torque)
-            start = made.start
-            now = place_along(rigid, joints, world, k, start)
-            old = joints.axial[r]
-            went, slope, state = driven(
-                joints.drive, r * DRIVES, 1.0 / inertia, start, now - (pull + old) / inertia, dt, joints.state[r], may
-            )
-            joints.state[r] = state
-            end = now - (pull + old) / inertia + went
-            if slope != made.slope:
-                anew = 1
-            made.slope = slope
-            if wp.isinf(slope):
-                made.shift = made.shift + line * (end - now)
-                made.turn = made.turn + spin * (end - now)
-                wrong = wp.max(wrong, wp.abs(end - now) - rounding)
+        trees.opening[at].alone = 1
+        shift, turn = rest_of(trees.node[n])
+        trees.opening[at].shift = shift
+        trees.opening[at].turn = turn
+        trees.opening[at].drive = 0.0
+        trees.opening[at].gives = 0.0
+        trees.opening[at].push = wp.vec3(0.0, 0.0, 0.0)
+        trees.opening[at].twist = wp.vec3(0.0, 0.0, 0.0)
+        trees.opening[at].ball_gives = wp.mat33(0.0)
+        trees.carried[at] = Inertia()
+        return wrong, anew
+    if trees.opening[at].alone == 1:
+        anew = 1
+    trees.opening[at].alone = 0
+    a = trees.node[n].a
+    b = trees.node[n].b
+    c = trees.node[n].c
+    shift = -sign * apart
+    turn = -sign * off
+    force = trees.node[n].force + (a * shift + b * turn)
+    torque = trees.node[n].torque + (shift * b + c * turn)
+    if kind == HINGE or kind == SLIDER:
+        axis = sign * trees.opening[at].axis
+        if stale == 1:
+            # of a unit of way along the free direction
+            if kind == HINGE:
+                trees.opening[at].push = b * axis
+                trees.opening[at].twist = c * axis
+                trees.opening[at].inertia = wp.dot(axis, trees.opening[at].twist)
             else:
-                free = first
-                stiff = first * slope
-                aim = wp.vec3(went * inertia - slope * (now - end) - old, 0.0, 0.0)
-                along = wp.outer(line, wp.vec3(1.0, 0.0, 0.0))
-                about = wp.outer(spin, wp.vec3(1.0, 0.0, 0.0))
+                trees.opening[at].push = a * axis
+                trees.opening[at].twist = axis * b
+                trees.opening[at].inertia = wp.dot(axis, trees.opening[at].push)
+        inertia = trees.opening[at].inertia
+        push = trees.opening[at].push
+        twist = trees.opening[at].twist
+        along = wp.dot(axis, force)
+        if kind == HINGE:
+            along = wp.dot(axis, torque)
+            rounding = ROTATION_ROUNDING
+        old = joints.axial[r]
+        w = 1.0 / inertia
+        free = fit.along - (along + old) * w
+        went, slope, state = driven(
+            joints.drive, r * DRIVES, w, trees.opening[at].start, free, dt, joints.state[r], may
+        )
+        joints.state[r] = state
+        end = free + went
+        if slope != trees.opening[at].slope:
+            anew = 1
+        trees.opening[at].slope = slope
+        step = end - fit.along
+        if wp.isinf(slope):
+            if kind == HINGE:
+                turn = turn + axis * step
+            else:
+                shift = shift + axis * step
+            force = force + push * step
+            torque = torque + twist * step
+            wrong = wp.max(wrong, wp.abs(step) - rounding)
+            trees.opening[at].gives = 0.0
+            trees.opening[at].drive = 0.0
+            if anew == 1:
+                trees.carried[at].a = a
+                trees.carried[at].b = b
+                trees.carried[at].c = c
+        else:
+            gives = 1.0 / (inertia + slope)
+            drive = went * inertia + slope * step - old - along
+            force = force + push * (gives * drive)
+            torque = torque + twist * (gives * drive)
+            trees.opening[at].gives = gives
+            trees.opening[at].drive = drive
+            if anew == 1:
+                far_push = gives * push
+                trees.carried[at].a = a - wp.outer(far_push, push)
+                trees.carried[at].b = b - wp.outer(far_push, twist)
+                trees.carried[at].c = c - wp.outer(gives * twist, twist)
+    elif kind == BALL:
+        # it turns with nothing: what is carried is a mass at its point
         if anew == 1:
-            made.along = along
-            made.about = about
-            made.push = made.whole.a * along + made.whole.b * about
-            made.twist = wp.transpose(made.whole.b) * along + made.whole.c * about
-            # directions that are not free get a 1 that nothing else meets
-            size = wp.trace(made.whole.c) + wp.trace(made.whole.a)
-            d = wp.transpose(along) * made.push + wp.transpose(about) * made.twist + stiff + (unit - free) * size
-            made.gives = free * inverted(d)
-            made.carried.a = made.whole.a - made.push * made.gives * wp.transpose(made.push)
-            made.carried.b = made.whole.b - made.push * made.gives * wp.transpose(made.twist)
-            made.carried.c = made.whole.c - made.twist * made.gives * wp.transpose(made.twist)
-        force = made.whole.force + made.whole.a * made.shift + made.whole.b * made.turn
-        torque = made.whole.torque + wp.transpose(made.whole.b) * made.shift + made.whole.c * made.turn
-        made.drive = aim - wp.transpose(made.along) * force - wp.transpose(made.about) * torque
-        made.carried.force = force + made.push * (made.gives * made.drive)
-        made.carried.torque = torque + made.twist * (made.gives * made.drive)
-    trees.opening[at] = made
+            ball_gives = inverted(c)
+            trees.opening[at].ball_gives = ball_gives
+            trees.carried[at].a = a - b * ball_gives * wp.transpose(b)
+            trees.carried[at].b = wp.mat33(0.0)
+            trees.carried[at].c = wp.mat33(0.0)
+        free_turn = trees.opening[at].ball_gives * -torque
+        turn = turn + free_turn
+        force = force + b * free_turn
+        torque = wp.vec3(0.0, 0.0, 0.0)
+    elif anew == 1:
+        trees.carried[at].a = a
+        trees.carried[at].b = b
+        trees.carried[at].c = c
+    trees.opening[at].shift = shift
+    trees.opening[at].turn = turn
+    trees.carried[at].force = force
+    trees.carried[at].torque = torque
     return wrong, anew
