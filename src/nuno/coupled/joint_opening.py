@@ -51,6 +51,15 @@ class Opening:
 
 
 @wp.struct
+class Fit:
+    """How far a joint's frames are from each other."""
+
+    apart: wp.vec3  # places that should not be apart, beyond what may stay so in the substep
+    off: wp.vec3  # turns that should not be, likewise
+    along: float  # of a hinge or slider, where it is along its free direction
+
+
+@wp.struct
 class Trees:
     """Joints that make trees, those that carry before those that are carried, and the joints that are in none."""
 
@@ -67,6 +76,7 @@ class Trees:
     node: wp.array(dtype=Inertia)  # (worlds * (count + roots)), at the joint's point, of roots at the centre of mass
     carried: wp.array(dtype=Inertia)  # (worlds * count), what a carrier feels of it at the joint's point
     opening: wp.array(dtype=Opening)  # (worlds * count)
+    fit: wp.array(dtype=Fit)  # (worlds * count), in this pass
     shift: wp.array(dtype=wp.vec3)  # (worlds * (count + roots)), of where the node's inertia is taken
     turn: wp.array(dtype=wp.vec3)
     pull: wp.array(dtype=wp.vec3)  # (worlds * (count + roots)), what joints bear of a pass, on the node's body,
@@ -114,18 +124,12 @@ def start_along(rigid: RigidState, joints: Joints, world: int, k: int, axis: wp.
     return start
 
 
-@wp.struct
-class Fit:
-    """How far a joint's frames are from each other."""
-
-    apart: wp.vec3  # places that should not be apart
-    off: wp.vec3  # turns that should not be
-    along: float  # of a hinge or slider, where it is along its free direction
-
-
 @wp.func
-def fit_of(rigid: RigidState, joints: Joints, world: int, k: int, start: float):
-    """Return `joint_misfit`, and where a hinge or slider is along its free direction, which was at ``start``."""
+def note_fit(rigid: RigidState, joints: Joints, trees: Trees, world: int, t: int):
+    """Note how a joint's frames are against each other: of all joints before any moves, as none needs another's."""
+    k = trees.joint[t]
+    at = world * trees.count + t
+    start = trees.opening[at].start
     r = world * joints.count + k
     i = world * rigid.capacity + joints.slot[k]
     kind = joints.kind[k]
@@ -134,14 +138,15 @@ def fit_of(rigid: RigidState, joints: Joints, world: int, k: int, start: float):
     axis = wp.quat_rotate(other_turn, z)
     turn = rigid.rotation[i] * joints.turn[r]
     made = Fit()
-    apart, off = misfit(kind, point_of(rigid, i, joints.place[r]) - place, turn, other_turn, axis)
-    made.apart = apart
-    made.off = off
+    away = point_of(rigid, i, joints.place[r]) - place
+    apart, off = misfit(kind, away, turn, other_turn, axis)
+    made.apart = apart - trees.opening[at].left
+    made.off = off - trees.opening[at].left_off
     if kind == HINGE:
         made.along = start + wrapped(angle_about(other_turn, turn) - start)
     if kind == SLIDER:
-        made.along = wp.dot(axis, point_of(rigid, i, joints.place[r]) - place)
-    return made
+        made.along = wp.dot(axis, away)
+    trees.fit[at] = made
 
 
 @wp.func
@@ -191,15 +196,15 @@ def open_joint(rigid: RigidState, joints: Joints, trees: Trees, world: int, t: i
     n = world * (trees.count + trees.roots) + t
     kind = joints.kind[k]
     sign = wp.where(trees.flipped[t] == 1, -1.0, 1.0)
-    fit = fit_of(rigid, joints, world, k, trees.opening[at].start)
-    apart = fit.apart - trees.opening[at].left
-    off = fit.off - trees.opening[at].left_off
+    apart = trees.fit[at].apart
+    off = trees.fit[at].off
+    place = trees.fit[at].along
     i = world * rigid.capacity + joints.slot[k]
     rounding = ROUNDING * (1.0 + wp.length(rigid.position[i]))
     wrong = wp.max(wp.max(wp.length(apart) - rounding, wp.length(off) - ROTATION_ROUNDING), 0.0)
     anew = stale
     limit = LIMITED * joints.limit[r] * dt * dt
-    if wp.length(joints.pull[r]) > limit or wp.length(joints.twist[r]) > limit:
+    if wp.length_sq(joints.pull[r]) > limit * limit or wp.length_sq(joints.twist[r]) > limit * limit:
         if trees.opening[at].alone == 0:
             anew = 1
         trees.opening[at].alone = 1
@@ -244,7 +249,7 @@ def open_joint(rigid: RigidState, joints: Joints, trees: Trees, world: int, t: i
             rounding = ROTATION_ROUNDING
         old = joints.axial[r]
         w = 1.0 / inertia
-        free = fit.along - (along + old) * w
+        free = place - (along + old) * w
         went, slope, state = driven(
             joints.drive, r * DRIVES, w, trees.opening[at].start, free, dt, joints.state[r], may
         )
@@ -253,7 +258,7 @@ def open_joint(rigid: RigidState, joints: Joints, trees: Trees, world: int, t: i
         if slope != trees.opening[at].slope:
             anew = 1
         trees.opening[at].slope = slope
-        step = end - fit.along
+        step = end - place
         if wp.isinf(slope):
             if kind == HINGE:
                 turn = turn + axis * step

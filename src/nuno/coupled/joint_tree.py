@@ -27,7 +27,7 @@ import warp as wp
 from nuno.coupled.articulated_inertia import body_inertia, rest_of, seen_from
 from nuno.coupled.drive_constraints import project_ball
 from nuno.coupled.joint_constraints import ROUNDING
-from nuno.coupled.joint_opening import ROTATION_ROUNDING, Trees, arms_of, axis_before, begin_opening, open_joint
+from nuno.coupled.joint_opening import ROTATION_ROUNDING, Trees, arms_of, axis_before, begin_opening, note_fit, open_joint
 from nuno.coupled.joint_response import BALL, HINGE, SLIDER, Joints, block_of
 from nuno.coupled.pass_progress import Passing, goes_on, island_of
 from nuno.coupled.tie_constraints import within
@@ -163,6 +163,7 @@ def project_trees(
         trees.changed[world * trees.count + t] = 0
         if k_pass == 0:
             begin_opening(rigid, joints, trees, world, t, dt)
+        note_fit(rigid, joints, trees, world, t)
     for back in range(trees.count):
         t = trees.count - 1 - back
         k = trees.joint[t]

@@ -10,7 +10,7 @@ import numpy as np
 import warp as wp
 
 from nuno.coupled.articulated_inertia import Inertia
-from nuno.coupled.joint_opening import Opening, Trees
+from nuno.coupled.joint_opening import Fit, Opening, Trees
 
 ANCHOR = -1
 """In place of a body: the world, or what is static."""
@@ -109,9 +109,8 @@ def tree_table(pairs: Sequence[tuple[int, int]], worlds: int, device: str) -> Tr
     ):  # fmt: skip
         setattr(table, name, wp.array(np.array(numbers, np.int32), dtype=int, device=device))
     nodes, joints = worlds * (table.count + table.roots), worlds * table.count
-    table.opening = wp.zeros(joints, dtype=Opening, device=device)
     for name, kind, count in (
-        ("node", Inertia, nodes), ("carried", Inertia, joints), ("shift", wp.vec3, nodes), ("turn", wp.vec3, nodes),
+        ("opening", Opening, joints), ("fit", Fit, joints), ("node", Inertia, nodes), ("carried", Inertia, joints), ("shift", wp.vec3, nodes), ("turn", wp.vec3, nodes),
         ("pull", wp.vec3, nodes), ("twist", wp.vec3, nodes), ("stale", int, nodes), ("changed", int, joints),
         ("wrong", float, joints),
     ):  # fmt: skip
