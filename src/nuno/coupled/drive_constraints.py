@@ -139,6 +139,8 @@ def driven(
     high = wp.max(drive[first + UPPER] - free, back - CATCH_UP * dt)
     if went < low or went > high:
         slope = wp.inf
+    if rub <= 0.0:
+        slides = HOLDS  # without friction it is no state at all, and must not say that it changed
     return wp.clamp(went, low, high), slope, slides
 
 

@@ -172,19 +172,10 @@ def settle_spin(rigid: RigidState, i: int, dt: float):
 @wp.func
 def settle_spins(rigid: RigidState, joints: Joints, world: int, k: int, dt: float):
     """`settle_spin` of a joint's bodies, those of earlier joints excepted."""
-    own = joints.slot[k]
-    other = joints.other[k]
-    first = bool(True)
-    first_other = other >= 0
-    for earlier in range(k):
-        a = joints.slot[earlier]
-        b = joints.other[earlier]
-        first = first and a != own and b != own
-        first_other = first_other and a != other and b != other
-    if first:
-        settle_spin(rigid, world * rigid.capacity + own, dt)
-    if first_other:
-        settle_spin(rigid, world * rigid.capacity + other, dt)
+    if (joints.settles[k] & 1) != 0:
+        settle_spin(rigid, world * rigid.capacity + joints.slot[k], dt)
+    if (joints.settles[k] & 2) != 0:
+        settle_spin(rigid, world * rigid.capacity + joints.other[k], dt)
 
 
 @wp.func

@@ -21,10 +21,13 @@ from nuno.rigid.rigid_body import RigidState, point_before, point_of
 LIMITED = wp.constant(0.999)
 """Of a joint's limit, from where on it bears no more in the substep."""
 
-ROTATION_ROUNDING = wp.constant(2.0e-6)
-"""[rad] What rounding leaves of a joint's turn: of two bodies' turns and their products with its frames 0.7e-6, and as
-much again of contacts, whose own rounding of 4e-7 m turns a foot by 3e-6. Friction that lets go or takes hold counts as
-wrong however little that turns, see `nuno.coupled.joint_tree.PIVOTED`."""
+ENOUGH_TURN = wp.constant(5.0e-6)
+"""[rad] From which on a joint's turn asks for another pass. Rounding leaves 0.7e-6 of two bodies' turns and their
+products with its frames, and contacts, whose own rounding of 4e-7 m turns a foot by 3e-6, as much again. What a pass
+finds it also mends, but for the square of it, so that what is left is far less. Friction that lets go or takes hold
+counts as wrong however little that turns, see `nuno.coupled.joint_tree.PIVOTED`."""
+ENOUGH_WAY = wp.constant(3.0e-6)
+"""[m] The same of a slider's way."""
 
 
 @wp.struct
@@ -201,7 +204,7 @@ def open_joint(rigid: RigidState, joints: Joints, trees: Trees, world: int, t: i
     place = trees.fit[at].along
     i = world * rigid.capacity + joints.slot[k]
     rounding = ROUNDING * (1.0 + wp.length(rigid.position[i]))
-    wrong = wp.max(wp.max(wp.length(apart) - rounding, wp.length(off) - ROTATION_ROUNDING), 0.0)
+    wrong = wp.max(wp.max(wp.length(apart) - rounding, wp.length(off) - ENOUGH_TURN), 0.0)
     anew = stale
     limit = LIMITED * joints.limit[r] * dt * dt
     if wp.length_sq(joints.pull[r]) > limit * limit or wp.length_sq(joints.twist[r]) > limit * limit:
@@ -246,7 +249,9 @@ def open_joint(rigid: RigidState, joints: Joints, trees: Trees, world: int, t: i
         along = wp.dot(axis, force)
         if kind == HINGE:
             along = wp.dot(axis, torque)
-            rounding = ROTATION_ROUNDING
+            rounding = ENOUGH_TURN
+        else:
+            rounding = ENOUGH_WAY
         old = joints.axial[r]
         w = 1.0 / inertia
         free = place - (along + old) * w

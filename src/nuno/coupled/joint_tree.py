@@ -26,8 +26,16 @@ import warp as wp
 
 from nuno.coupled.articulated_inertia import body_inertia, rest_of, seen_from
 from nuno.coupled.drive_constraints import project_ball
-from nuno.coupled.joint_constraints import ROUNDING
-from nuno.coupled.joint_opening import ROTATION_ROUNDING, Trees, arms_of, axis_before, begin_opening, note_fit, open_joint
+from nuno.coupled.joint_opening import (
+    ENOUGH_TURN,
+    ENOUGH_WAY,
+    Trees,
+    arms_of,
+    axis_before,
+    begin_opening,
+    note_fit,
+    open_joint,
+)
 from nuno.coupled.joint_response import BALL, HINGE, SLIDER, Joints, block_of
 from nuno.coupled.pass_progress import Passing, goes_on, island_of
 from nuno.coupled.tie_constraints import within
@@ -71,10 +79,7 @@ def close_joint(rigid: RigidState, joints: Joints, trees: Trees, world: int, t: 
             turn = turn + (sign * q) * axis
         else:
             shift = shift + (sign * q) * axis
-    rounding = ROTATION_ROUNDING
-    if kind == SLIDER:
-        rounding = ROUNDING * (1.0 + wp.length(rigid.position[world * rigid.capacity + joints.slot[k]]))
-    trees.wrong[at] = wp.max(trees.wrong[at], went - rounding)
+    trees.wrong[at] = wp.max(trees.wrong[at], went - wp.where(kind == SLIDER, ENOUGH_WAY, ENOUGH_TURN))
     trees.turn[nodes + t] = turn + trees.opening[at].turn
     trees.shift[nodes + t] = shift + trees.opening[at].shift
     limit = joints.limit[r] * dt * dt
