@@ -102,16 +102,22 @@ def joint_misfit(rigid: RigidState, joints: Joints, world: int, k: int):
 
 
 @wp.func
-def joint_left(rigid: RigidState, joints: Joints, world: int, k: int, dt: float):
-    """The distance and turn that a joint leaves in a substep: what it may not mend of how that began."""
+def joint_before(rigid: RigidState, joints: Joints, world: int, k: int):
+    """The distance and turn of `joint_misfit` where the substep began."""
     r = world * joints.count + k
     i = world * rigid.capacity + joints.slot[k]
     _place, _turn, place_before, other_before = other_frame(rigid, joints, world, k)
-    apart, off = misfit(
+    return misfit(
         joints.kind[k], point_before(rigid, i, joints.place[r]) - place_before,
         rigid.rotation_before[i] * joints.turn[r], other_before,
         wp.quat_rotate(other_before, wp.vec3(0.0, 0.0, 1.0)),
     )  # fmt: skip
+
+
+@wp.func
+def joint_left(rigid: RigidState, joints: Joints, world: int, k: int, dt: float):
+    """The distance and turn that a joint leaves in a substep: what it may not mend of how that began."""
+    apart, off = joint_before(rigid, joints, world, k)
     return left_over(apart, CATCH_UP * dt), left_over(off, CATCH_UP * dt)
 
 

@@ -17,7 +17,7 @@ from nuno.rigid.persistent_manifolds import COLOURS, COUNTS, FAR, POINTS, Contac
 from nuno.rigid.rigid_body import RigidState, rotation_between
 from nuno.rigid.rigid_contact import part_entry
 
-ROUNDING = wp.constant(5.0e-7)
+ROUNDING = wp.constant(2.0e-7)
 """[m] What rounding of coordinates leaves of a contact, at a metre from the origin."""
 
 

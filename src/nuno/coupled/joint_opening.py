@@ -3,8 +3,8 @@
 import warp as wp
 
 from nuno.coupled.articulated_inertia import Inertia, rest_of
-from nuno.coupled.drive_constraints import angle_about, driven, wrapped
-from nuno.coupled.joint_constraints import ROUNDING, joint_left, misfit
+from nuno.coupled.drive_constraints import angle_about, driven
+from nuno.coupled.joint_constraints import ROUNDING, joint_before
 from nuno.coupled.joint_response import (
     BALL,
     DRIVES,
@@ -14,14 +14,14 @@ from nuno.coupled.joint_response import (
     arm_of,
     inverted,
     other_frame,
-    other_frame_now,
 )
-from nuno.rigid.rigid_body import RigidState, point_before, point_of
+from nuno.coupled.tie_constraints import CATCH_UP, left_over
+from nuno.rigid.rigid_body import RigidState, fine_turn, point_before
 
 LIMITED = wp.constant(0.999)
 """Of a joint's limit, from where on it bears no more in the substep."""
 
-ENOUGH_TURN = wp.constant(5.0e-6)
+ENOUGH_TURN = wp.constant(2.0e-6)
 """[rad] From which on a joint's turn asks for another pass. Rounding leaves 0.7e-6 of two bodies' turns and their
 products with its frames, and contacts, whose own rounding of 4e-7 m turns a foot by 3e-6, as much again. What a pass
 finds it also mends, but for the square of it, so that what is left is far less. Friction that lets go or takes hold
@@ -49,6 +49,8 @@ class Opening:
     other_arm: wp.vec3  # and of what carries it
     reach: wp.vec3  # to the joint, from where the inertia of what carries it is taken
     start: float  # where it was along its free direction
+    apart: wp.vec3  # how far its frames were from each other: places,
+    off: wp.vec3  # and turns
     left: wp.vec3  # of a wrong place, and of a wrong turn, what may not be mended in the substep
     left_off: wp.vec3
 
@@ -128,27 +130,67 @@ def start_along(rigid: RigidState, joints: Joints, world: int, k: int, axis: wp.
 
 
 @wp.func
+def half_turn(rigid: RigidState, i: int):
+    """The turn of a body since the substep began, as the tangent of half its angle along its axis; i below 0: none."""
+    turn = wp.vec3(0.0, 0.0, 0.0)
+    if i >= 0:
+        turn = 0.5 * fine_turn(rigid.rotation_before[i], rigid.rotation[i])
+    return turn
+
+
+@wp.func
+def carried_by(turn: wp.vec3, arm: wp.vec3):
+    """Return how far a `half_turn` takes the end of an arm."""
+    across = wp.cross(turn, arm)
+    return (2.0 / (1.0 + wp.dot(turn, turn))) * (across + wp.cross(turn, across))
+
+
+@wp.func
 def note_fit(rigid: RigidState, joints: Joints, trees: Trees, world: int, t: int):
-    """Note how a joint's frames are against each other: of all joints before any moves, as none needs another's."""
+    """Note how a joint's frames are against each other: of all joints before any moves, as none needs another's.
+
+    From where the substep began on, by what the bodies moved since: small numbers have more digits than quaternions.
+    Of frames put together anew floats would round 0.7 urad, and passes go on for that.
+    """
     k = trees.joint[t]
     at = world * trees.count + t
-    start = trees.opening[at].start
     r = world * joints.count + k
     i = world * rigid.capacity + joints.slot[k]
+    j = int(-1)
+    if joints.other[k] >= 0:
+        j = world * rigid.capacity + joints.other[k]
     kind = joints.kind[k]
-    z = wp.vec3(0.0, 0.0, 1.0)
-    place, other_turn = other_frame_now(rigid, joints, world, k)
-    axis = wp.quat_rotate(other_turn, z)
-    turn = rigid.rotation[i] * joints.turn[r]
+    flipped = trees.flipped[t] == 1
+    axis = trees.opening[at].axis
+    arm = wp.where(flipped, trees.opening[at].other_arm, trees.opening[at].arm)
+    other_arm = wp.where(flipped, trees.opening[at].arm, trees.opening[at].other_arm)
+    turn = half_turn(rigid, i)
+    other_turn = half_turn(rigid, j)
+    away = rigid.position[i] - rigid.position_before[i] + carried_by(turn, arm)
+    if j >= 0:
+        away = away - (rigid.position[j] - rigid.position_before[j] + carried_by(other_turn, other_arm))
+    # of the two against each other
+    turned = (turn - other_turn - wp.cross(other_turn, turn)) / (1.0 + wp.dot(turn, other_turn))
+    apart = trees.opening[at].apart + away
+    off = trees.opening[at].off
     made = Fit()
-    away = point_of(rigid, i, joints.place[r]) - place
-    apart, off = misfit(kind, away, turn, other_turn, axis)
+    if kind == HINGE:
+        line = axis + wp.cross(off, axis)  # of the body's own frame
+        u = carried_by(other_turn, axis)
+        v = carried_by(turn, line)
+        off = off + (wp.cross(axis, v) + wp.cross(u, line) + wp.cross(u, v))
+        made.along = trees.opening[at].start + 2.0 * wp.atan(wp.dot(turned, axis))
+    elif kind == SLIDER:
+        now = axis + carried_by(other_turn, axis)
+        # the place on the line goes with the other body: what it is away now is along the line, or wrong
+        along = wp.dot(now, away)
+        apart = apart - now * along
+        off = off + 2.0 * turned
+        made.along = trees.opening[at].start + along
+    elif kind != BALL:
+        off = off + 2.0 * turned
     made.apart = apart - trees.opening[at].left
     made.off = off - trees.opening[at].left_off
-    if kind == HINGE:
-        made.along = start + wrapped(angle_about(other_turn, turn) - start)
-    if kind == SLIDER:
-        made.along = wp.dot(axis, away)
     trees.fit[at] = made
 
 
@@ -159,7 +201,7 @@ def begin_opening(rigid: RigidState, joints: Joints, trees: Trees, world: int, t
     at = world * trees.count + t
     _i, _j, arm, other_arm = arms_of(rigid, joints, world, k)
     axis = axis_before(rigid, joints, world, k)
-    left, left_off = joint_left(rigid, joints, world, k, dt)
+    apart, off = joint_before(rigid, joints, world, k)
     made = Opening()
     made.axis = axis
     made.arm = wp.where(trees.flipped[t] == 1, other_arm, arm)
@@ -168,8 +210,10 @@ def begin_opening(rigid: RigidState, joints: Joints, trees: Trees, world: int, t
     carrier = trees.carrier[t]
     if carrier >= 0 and carrier < trees.count:
         made.reach = made.other_arm - trees.opening[world * trees.count + carrier].arm
-    made.left = left
-    made.left_off = left_off
+    made.apart = apart
+    made.off = off
+    made.left = left_over(apart, CATCH_UP * dt)
+    made.left_off = left_over(off, CATCH_UP * dt)
     if joints.kind[k] == HINGE or joints.kind[k] == SLIDER:
         made.start = start_along(rigid, joints, world, k, axis)
     trees.opening[at] = made
