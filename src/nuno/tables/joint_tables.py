@@ -63,7 +63,7 @@ class CoupledJoints:
         specs: list[JointSpec] = [joint.spec for joint in joints]
         slots = [scene.slot_of(joint.body) for joint in joints]
         other_slots = [-1 if j.target is None else scene.slot_of(j.target) for j in joints]
-        seen: set[int] = {-1}
+        seen: set[int | None] = {-1}
         settles = []
         for own_slot, other_slot in zip(slots, other_slots, strict=True):
             settles.append((own_slot not in seen) + 2 * (other_slot not in seen))
