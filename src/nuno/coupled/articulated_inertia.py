@@ -18,27 +18,21 @@ class Inertia:
 
 
 @wp.func
-def seen_from(own: Inertia, arm: wp.vec3):
-    """The inertia of a frame as that of another of the same body, from which ``arm`` leads to it."""
-    s = wp.skew(arm)
-    made = Inertia()
-    made.a = own.a
-    made.b = own.b - own.a * s
-    made.c = own.c + s * own.b - wp.transpose(own.b) * s - s * own.a * s
-    made.force = own.force
-    made.torque = own.torque + wp.cross(arm, own.force)
-    return made
+def crossed_rows(m: wp.mat33, v: wp.vec3):
+    """A matrix times that which crosses v with what it is multiplied by: each of its rows crossed with v."""
+    return wp.matrix_from_rows(wp.cross(m[0], v), wp.cross(m[1], v), wp.cross(m[2], v))
 
 
 @wp.func
-def added(one: Inertia, other: Inertia):
-    """The sum of two inertias of one frame."""
+def seen_from(own: Inertia, arm: wp.vec3):
+    """The inertia of a frame as that of another of the same body, from which ``arm`` leads to it."""
     made = Inertia()
-    made.a = one.a + other.a
-    made.b = one.b + other.b
-    made.c = one.c + other.c
-    made.force = one.force + other.force
-    made.torque = one.torque + other.torque
+    made.a = own.a
+    made.b = own.b - crossed_rows(own.a, arm)
+    # s b' - b^T s, with s what crosses the arm
+    made.c = own.c - wp.transpose(crossed_rows(wp.transpose(made.b), arm)) - crossed_rows(wp.transpose(own.b), arm)
+    made.force = own.force
+    made.torque = own.torque + wp.cross(arm, own.force)
     return made
 
 
@@ -53,10 +47,13 @@ def rest_of(own: Inertia):
 
 
 @wp.func
-def body_inertia(rigid: RigidState, i: int):
-    """A rigid body's own inertia at its centre of mass; without mass, none."""
+def body_inertia(rigid: RigidState, i: int, arm: wp.vec3):
+    """A rigid body's own inertia, at a point to which ``arm`` leads from its centre of mass; without mass, none."""
     made = Inertia()
     if rigid.weight[i] > 0.0:
-        made.a = wp.identity(n=3, dtype=float) / rigid.weight[i]
-        made.c = inverted(rigid.give[i])
+        mass = 1.0 / rigid.weight[i]
+        unit = wp.identity(n=3, dtype=float)
+        made.a = mass * unit
+        made.b = mass * wp.skew(arm)
+        made.c = inverted(rigid.give[i]) + mass * (wp.dot(arm, arm) * unit - wp.outer(arm, arm))
     return made

@@ -83,7 +83,9 @@ def driven(
     back = start - free
     # spring: at the start's stretch, which keeps energy, as far as that is stable
     k = drive[first + SPRING] * h2
-    late = wp.max(0.0, 1.0 - 1.0 / wp.max(k * w, 1.0))
+    late = float(0.0)
+    if k * w > 1.0:
+        late = 1.0 - 1.0 / (k * w)
     damp = drive[first + SPRING_DAMPING] * dt
     passive = k * late + damp
     force = k * (drive[first + REST] - start) + k * late * back + damp * back
@@ -137,6 +139,8 @@ def driven(
     high = wp.max(drive[first + UPPER] - free, back - CATCH_UP * dt)
     if went < low or went > high:
         slope = wp.inf
+    if rub <= 0.0:
+        slides = HOLDS  # without friction it is no state at all, and must not say that it changed
     return wp.clamp(went, low, high), slope, slides
 
 

@@ -102,16 +102,22 @@ def joint_misfit(rigid: RigidState, joints: Joints, world: int, k: int):
 
 
 @wp.func
-def joint_left(rigid: RigidState, joints: Joints, world: int, k: int, dt: float):
-    """The distance and turn that a joint leaves in a substep: what it may not mend of how that began."""
+def joint_before(rigid: RigidState, joints: Joints, world: int, k: int):
+    """The distance and turn of `joint_misfit` where the substep began."""
     r = world * joints.count + k
     i = world * rigid.capacity + joints.slot[k]
     _place, _turn, place_before, other_before = other_frame(rigid, joints, world, k)
-    apart, off = misfit(
+    return misfit(
         joints.kind[k], point_before(rigid, i, joints.place[r]) - place_before,
         rigid.rotation_before[i] * joints.turn[r], other_before,
         wp.quat_rotate(other_before, wp.vec3(0.0, 0.0, 1.0)),
     )  # fmt: skip
+
+
+@wp.func
+def joint_left(rigid: RigidState, joints: Joints, world: int, k: int, dt: float):
+    """The distance and turn that a joint leaves in a substep: what it may not mend of how that began."""
+    apart, off = joint_before(rigid, joints, world, k)
     return left_over(apart, CATCH_UP * dt), left_over(off, CATCH_UP * dt)
 
 
@@ -172,19 +178,10 @@ def settle_spin(rigid: RigidState, i: int, dt: float):
 @wp.func
 def settle_spins(rigid: RigidState, joints: Joints, world: int, k: int, dt: float):
     """`settle_spin` of a joint's bodies, those of earlier joints excepted."""
-    own = joints.slot[k]
-    other = joints.other[k]
-    first = bool(True)
-    first_other = other >= 0
-    for earlier in range(k):
-        a = joints.slot[earlier]
-        b = joints.other[earlier]
-        first = first and a != own and b != own
-        first_other = first_other and a != other and b != other
-    if first:
-        settle_spin(rigid, world * rigid.capacity + own, dt)
-    if first_other:
-        settle_spin(rigid, world * rigid.capacity + other, dt)
+    if (joints.settles[k] & 1) != 0:
+        settle_spin(rigid, world * rigid.capacity + joints.slot[k], dt)
+    if (joints.settles[k] & 2) != 0:
+        settle_spin(rigid, world * rigid.capacity + joints.other[k], dt)
 
 
 @wp.func

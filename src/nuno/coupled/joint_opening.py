@@ -2,9 +2,9 @@
 
 import warp as wp
 
-from nuno.coupled.articulated_inertia import Inertia, rest_of, seen_from
-from nuno.coupled.drive_constraints import angle_about, driven, wrapped
-from nuno.coupled.joint_constraints import ROUNDING, joint_left, joint_misfit
+from nuno.coupled.articulated_inertia import Inertia, rest_of
+from nuno.coupled.drive_constraints import angle_about, driven
+from nuno.coupled.joint_constraints import ROUNDING, joint_before
 from nuno.coupled.joint_response import (
     BALL,
     DRIVES,
@@ -14,44 +14,62 @@ from nuno.coupled.joint_response import (
     arm_of,
     inverted,
     other_frame,
-    other_frame_now,
 )
-from nuno.rigid.rigid_body import RigidState, point_before, point_of
+from nuno.coupled.tie_constraints import CATCH_UP, left_over
+from nuno.rigid.rigid_body import RigidState, fine_turn, point_before
 
 LIMITED = wp.constant(0.999)
 """Of a joint's limit, from where on it bears no more in the substep."""
 
-ROTATION_ROUNDING = wp.constant(2.0e-6)
-"""[rad] What rounding leaves of a joint's turn: of two bodies' turns and their products with its frames 0.7e-6, and as
-much again of contacts, whose own rounding of 4e-7 m turns a foot by 3e-6. Friction that lets go or takes hold counts as
-wrong however little that turns, see `nuno.coupled.joint_tree.PIVOTED`."""
+ENOUGH_ROTATION = wp.constant(5.0e-6)
+"""[rad] From which on a turn of a joint asks for another pass. What a pass finds it mends, but for the square of it and
+for what contacts do next, so that far less is left. Friction that lets go or takes hold counts as wrong however little
+that turns, see `nuno.coupled.joint_tree.PIVOTED`."""
+ENOUGH_WAY = wp.constant(3.0e-6)
+"""[m] The same of a slider's way."""
 
 
 @wp.struct
 class Opening:
-    """Response of a joint of a tree to the body that carries it."""
+    """Response of a joint of a tree to the body that carries it, at the joint's point."""
 
-    carried: Inertia  # what that body feels of it
-    push: wp.mat33  # U, columns: forces,
-    twist: wp.mat33  # and torques
-    gives: wp.mat33  # D^-1
-    drive: wp.vec3  # u
-    along: wp.mat33  # S, columns: shifts,
-    about: wp.mat33  # and turns
-    shift: wp.vec3  # what it takes back of a wrong place,
+    push: wp.vec3  # U of a hinge or slider: a force,
+    twist: wp.vec3  # and a torque
+    gives: float  # D^-1; 0 where nothing is free
+    swivel: wp.mat33  # D^-1 of a ball joint
+    drive: float  # u
+    shift: wp.vec3  # what it takes back of a wrong place, and what it is driven by where that is given,
     turn: wp.vec3  # and of a wrong turn
     alone: int  # 1: what hangs on it follows nothing
-    whole: Inertia  # of what it carries, as seen from it
-    line: wp.vec3  # of a hinge or slider, the multiplier's shift and turn of its free direction:
-    spin: wp.vec3
-    inertia: float  # what a unit of way takes along it
+    inertia: float  # what a unit of way takes along a free direction
     slope: float  # stiffness of what drives it
     axis: wp.vec3  # where the substep began
     arm: wp.vec3  # to the joint, of what it carries
     other_arm: wp.vec3  # and of what carries it
+    reach: wp.vec3  # to the joint, from where the inertia of what carries it is taken
     start: float  # where it was along its free direction
+    apart: wp.vec3  # how far its frames were from each other: places,
+    off: wp.vec3  # and turns
     left: wp.vec3  # of a wrong place, and of a wrong turn, what may not be mended in the substep
     left_off: wp.vec3
+
+
+@wp.struct
+class Fit:
+    """The frames of a joint against each other."""
+
+    apart: wp.vec3  # places that should not be apart, beyond what may stay so in the substep
+    off: wp.vec3  # turns that should not be, likewise
+    along: float  # of a hinge or slider, where it is along its free direction
+
+
+@wp.struct
+class Reply:
+    """The inverse of an inertia: shifts a force + b torque, and turns b^T force + c torque."""
+
+    a: wp.mat33
+    b: wp.mat33
+    c: wp.mat33
 
 
 @wp.struct
@@ -64,14 +82,29 @@ class Trees:
     joint: wp.array(dtype=int)  # (count)
     carrier: wp.array(dtype=int)  # (count) the node that carries: a joint's place here, or count and a root's; -1: none
     flipped: wp.array(dtype=int)  # (count) 1 where it carries its own body's other
+    heir: wp.array(dtype=int)  # (count + roots) the last joint that a node carries, -1: none
+    next_heir: wp.array(dtype=int)  # (count) the one before that the same node carries
     root: wp.array(dtype=int)  # (roots) slot
     alone: wp.array(dtype=int)  # (lone)
-    node: wp.array(dtype=Inertia)  # (worlds * (count + roots)), at the centre of mass
+    node: wp.array(dtype=Inertia)  # (worlds * (count + roots)), at the joint's point, of roots at the centre of mass
+    carried: wp.array(dtype=Inertia)  # (worlds * count), what a carrier feels of it at the joint's point
     opening: wp.array(dtype=Opening)  # (worlds * count)
-    shift: wp.array(dtype=wp.vec3)  # (worlds * (count + roots)), of the centre of mass
+    fit: wp.array(dtype=Fit)  # (worlds * count), in this pass
+    shift: wp.array(dtype=wp.vec3)  # (worlds * (count + roots)), of where the node's inertia is taken
     turn: wp.array(dtype=wp.vec3)
+    pull: wp.array(dtype=wp.vec3)  # (worlds * (count + roots)), what joints bear of a pass, on the node's body,
+    twist: wp.array(dtype=wp.vec3)  # about its centre of mass
     stale: wp.array(dtype=int)  # (worlds * (count + roots)), whether the inertia of a node is to be added up anew
     changed: wp.array(dtype=int)  # (worlds * count), whether friction of it, or of what it carries, did in the pass
+    slots: int  # of bodies, up to the last in a tree
+    node_of: wp.array(dtype=int)  # (slots), -1: none
+    asked: wp.array(dtype=int)  # (worlds * (count + roots)), whether contacts ask for the reply of a node's body,
+    reply: wp.array(dtype=Reply)  # at its centre of mass
+    pushed: wp.array(dtype=wp.vec3)  # (worlds * (count + roots)), what contacts push a node's body by in the pass,
+    spun: wp.array(dtype=wp.vec3)  # and its torque about the centre of mass,
+    ahead: wp.array(dtype=wp.vec3)  # and where it goes for all of these, if contacts ask for its reply: a shift,
+    ahead_turn: wp.array(dtype=wp.vec3)  # and a turn
+    bore: wp.array(dtype=wp.vec3)  # (worlds * count), how a joint opens for the push on what it carries
     wrong: wp.array(dtype=float)  # (worlds * count), how far each joint was from where it should be
 
 
@@ -114,34 +147,89 @@ def start_along(rigid: RigidState, joints: Joints, world: int, k: int, axis: wp.
 
 
 @wp.func
-def place_along(rigid: RigidState, joints: Joints, world: int, k: int, start: float):
-    """Return where a hinge or slider is along its free direction, which was at ``start``."""
-    r = world * joints.count + k
+def half_turn(rigid: RigidState, i: int):
+    """The turn of a body since the substep began, as the tangent of half its angle along its axis; i below 0: none."""
+    turn = wp.vec3(0.0, 0.0, 0.0)
+    if i >= 0:
+        turn = 0.5 * fine_turn(rigid.rotation_before[i], rigid.rotation[i])
+    return turn
+
+
+@wp.func
+def carried_by(turn: wp.vec3, arm: wp.vec3):
+    """Return how far a `half_turn` takes the end of an arm."""
+    across = wp.cross(turn, arm)
+    return (2.0 / (1.0 + wp.dot(turn, turn))) * (across + wp.cross(turn, across))
+
+
+@wp.func
+def note_fit(rigid: RigidState, joints: Joints, trees: Trees, world: int, t: int):
+    """Note how a joint's frames are against each other: of all joints before any moves, as none needs another's.
+
+    From where the substep began on, by what the bodies moved since: small numbers have more digits than quaternions.
+    Of frames put together anew floats would round 0.7 urad, and passes go on for that.
+    """
+    k = trees.joint[t]
+    at = world * trees.count + t
     i = world * rigid.capacity + joints.slot[k]
-    place, other_turn = other_frame_now(rigid, joints, world, k)
-    now = float(0.0)
-    if joints.kind[k] == HINGE:
-        now = start + wrapped(angle_about(other_turn, rigid.rotation[i] * joints.turn[r]) - start)
-    else:
-        now_axis = wp.quat_rotate(other_turn, wp.vec3(0.0, 0.0, 1.0))
-        now = wp.dot(now_axis, point_of(rigid, i, joints.place[r]) - place)
-    return now
+    j = int(-1)
+    if joints.other[k] >= 0:
+        j = world * rigid.capacity + joints.other[k]
+    kind = joints.kind[k]
+    flipped = trees.flipped[t] == 1
+    axis = trees.opening[at].axis
+    arm = wp.where(flipped, trees.opening[at].other_arm, trees.opening[at].arm)
+    other_arm = wp.where(flipped, trees.opening[at].arm, trees.opening[at].other_arm)
+    turn = half_turn(rigid, i)
+    other_turn = half_turn(rigid, j)
+    away = rigid.position[i] - rigid.position_before[i] + carried_by(turn, arm)
+    if j >= 0:
+        away = away - (rigid.position[j] - rigid.position_before[j] + carried_by(other_turn, other_arm))
+    # of the two against each other
+    turned = (turn - other_turn - wp.cross(other_turn, turn)) / (1.0 + wp.dot(turn, other_turn))
+    apart = trees.opening[at].apart + away
+    off = trees.opening[at].off
+    made = Fit()
+    if kind == HINGE:
+        line = axis + wp.cross(off, axis)  # of the body's own frame
+        u = carried_by(other_turn, axis)
+        v = carried_by(turn, line)
+        off = off + (wp.cross(axis, v) + wp.cross(u, line) + wp.cross(u, v))
+        made.along = trees.opening[at].start + 2.0 * wp.atan(wp.dot(turned, axis))
+    elif kind == SLIDER:
+        now = axis + carried_by(other_turn, axis)
+        # the place on the line goes with the other body: what it is away now is along the line, or wrong
+        along = wp.dot(now, away)
+        apart = apart - now * along
+        off = off + 2.0 * turned
+        made.along = trees.opening[at].start + along
+    elif kind != BALL:
+        off = off + 2.0 * turned
+    made.apart = apart - trees.opening[at].left
+    made.off = off - trees.opening[at].left_off
+    trees.fit[at] = made
 
 
 @wp.func
 def begin_opening(rigid: RigidState, joints: Joints, trees: Trees, world: int, t: int, dt: float):
-    """Keep what of a joint stays as it is for a whole substep."""
+    """Keep what of a joint stays as it is for a whole substep; those of joints that carry it come before."""
     k = trees.joint[t]
     at = world * trees.count + t
     _i, _j, arm, other_arm = arms_of(rigid, joints, world, k)
     axis = axis_before(rigid, joints, world, k)
-    left, left_off = joint_left(rigid, joints, world, k, dt)
+    apart, off = joint_before(rigid, joints, world, k)
     made = Opening()
     made.axis = axis
     made.arm = wp.where(trees.flipped[t] == 1, other_arm, arm)
     made.other_arm = wp.where(trees.flipped[t] == 1, arm, other_arm)
-    made.left = left
-    made.left_off = left_off
+    made.reach = made.other_arm
+    carrier = trees.carrier[t]
+    if carrier >= 0 and carrier < trees.count:
+        made.reach = made.other_arm - trees.opening[world * trees.count + carrier].arm
+    made.apart = apart
+    made.off = off
+    made.left = left_over(apart, CATCH_UP * dt)
+    made.left_off = left_over(off, CATCH_UP * dt)
     if joints.kind[k] == HINGE or joints.kind[k] == SLIDER:
         made.start = start_along(rigid, joints, world, k, axis)
     trees.opening[at] = made
@@ -171,108 +259,115 @@ def open_joint(rigid: RigidState, joints: Joints, trees: Trees, world: int, t: i
     n = world * (trees.count + trees.roots) + t
     kind = joints.kind[k]
     sign = wp.where(trees.flipped[t] == 1, -1.0, 1.0)
-    unit = wp.identity(n=3, dtype=float)
-    first = wp.mat33(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    made = trees.opening[at]
-    if stale == 1:
-        made.whole = seen_from(trees.node[n], -made.arm)
-    else:
-        made.whole.force = trees.node[n].force
-        made.whole.torque = trees.node[n].torque + wp.cross(-made.arm, trees.node[n].force)
-    axis = made.axis
-    apart, off = joint_misfit(rigid, joints, world, k)
-    apart = apart - made.left
-    off = off - made.left_off
+    apart = trees.fit[at].apart
+    off = trees.fit[at].off
+    place = trees.fit[at].along
     i = world * rigid.capacity + joints.slot[k]
     rounding = ROUNDING * (1.0 + wp.length(rigid.position[i]))
-    wrong = wp.max(wp.max(wp.length(apart) - rounding, wp.length(off) - ROTATION_ROUNDING), 0.0)
+    wrong = wp.max(wp.max(wp.length(apart) - rounding, wp.length(off) - ENOUGH_ROTATION), 0.0)
     anew = stale
-    if kind == HINGE:
-        rounding = ROTATION_ROUNDING
     limit = LIMITED * joints.limit[r] * dt * dt
-    if wp.length(joints.pull[r]) > limit or wp.length(joints.twist[r]) > limit:
-        if made.alone == 0:
+    if wp.length_sq(joints.pull[r]) > limit * limit or wp.length_sq(joints.twist[r]) > limit * limit:
+        if trees.opening[at].alone == 0:
             anew = 1
-        made.alone = 1
-        shift, turn = rest_of(made.whole)
-        made.shift = shift
-        made.turn = turn
-        made.drive = wp.vec3(0.0, 0.0, 0.0)
-        made.carried.force = wp.vec3(0.0, 0.0, 0.0)
-        made.carried.torque = wp.vec3(0.0, 0.0, 0.0)
-        if anew == 1:
-            made.along = wp.mat33(0.0)
-            made.about = wp.mat33(0.0)
-            made.push = wp.mat33(0.0)
-            made.twist = wp.mat33(0.0)
-            made.gives = wp.mat33(0.0)
-            made.carried.a = wp.mat33(0.0)
-            made.carried.b = wp.mat33(0.0)
-            made.carried.c = wp.mat33(0.0)
-    else:
-        if made.alone == 1:
-            anew = 1
-        made.alone = 0
-        made.shift = -sign * apart
-        made.turn = -sign * off
-        free = wp.mat33(0.0)  # 1 on the diagonal for each free direction
-        stiff = wp.mat33(0.0)
-        aim = wp.vec3(0.0, 0.0, 0.0)
-        along = wp.mat33(0.0)
-        about = wp.mat33(0.0)
-        if kind == BALL:
-            free = unit
-            about = sign * unit
-        if kind == HINGE or kind == SLIDER:
-            line = wp.vec3(0.0, 0.0, 0.0)
-            spin = sign * axis
-            if kind == SLIDER:
-                line = sign * axis
-                spin = wp.vec3(0.0, 0.0, 0.0)
-            if stale == 1:
-                made.line = made.whole.a * line + made.whole.b * spin
-                made.spin = wp.transpose(made.whole.b) * line + made.whole.c * spin
-                made.inertia = wp.dot(line, made.line) + wp.dot(spin, made.spin)
-            inertia = made.inertia
-            pull = wp.dot(made.line, made.shift) + wp.dot(made.spin, made.turn)
-            pull = pull + wp.dot(line, made.whole.force) + wp.dot(spin, made.whole.torque)
-            start = made.start
-            now = place_along(rigid, joints, world, k, start)
-            old = joints.axial[r]
-            went, slope, state = driven(
-                joints.drive, r * DRIVES, 1.0 / inertia, start, now - (pull + old) / inertia, dt, joints.state[r], may
-            )
-            joints.state[r] = state
-            end = now - (pull + old) / inertia + went
-            if slope != made.slope:
-                anew = 1
-            made.slope = slope
-            if wp.isinf(slope):
-                made.shift = made.shift + line * (end - now)
-                made.turn = made.turn + spin * (end - now)
-                wrong = wp.max(wrong, wp.abs(end - now) - rounding)
+        trees.opening[at].alone = 1
+        shift, turn = rest_of(trees.node[n])
+        trees.opening[at].shift = shift
+        trees.opening[at].turn = turn
+        trees.opening[at].drive = 0.0
+        trees.opening[at].gives = 0.0
+        trees.opening[at].push = wp.vec3(0.0, 0.0, 0.0)
+        trees.opening[at].twist = wp.vec3(0.0, 0.0, 0.0)
+        trees.opening[at].swivel = wp.mat33(0.0)
+        trees.carried[at] = Inertia()
+        return wrong, anew
+    if trees.opening[at].alone == 1:
+        anew = 1
+    trees.opening[at].alone = 0
+    a = trees.node[n].a
+    b = trees.node[n].b
+    c = trees.node[n].c
+    shift = -sign * apart
+    turn = -sign * off
+    force = trees.node[n].force + (a * shift + b * turn)
+    torque = trees.node[n].torque + (shift * b + c * turn)
+    if kind == HINGE or kind == SLIDER:
+        axis = sign * trees.opening[at].axis
+        if stale == 1:
+            # of a unit of way along the free direction
+            if kind == HINGE:
+                trees.opening[at].push = b * axis
+                trees.opening[at].twist = c * axis
+                trees.opening[at].inertia = wp.dot(axis, trees.opening[at].twist)
             else:
-                free = first
-                stiff = first * slope
-                aim = wp.vec3(went * inertia - slope * (now - end) - old, 0.0, 0.0)
-                along = wp.outer(line, wp.vec3(1.0, 0.0, 0.0))
-                about = wp.outer(spin, wp.vec3(1.0, 0.0, 0.0))
+                trees.opening[at].push = a * axis
+                trees.opening[at].twist = axis * b
+                trees.opening[at].inertia = wp.dot(axis, trees.opening[at].push)
+        inertia = trees.opening[at].inertia
+        push = trees.opening[at].push
+        twist = trees.opening[at].twist
+        along = wp.dot(axis, force)
+        if kind == HINGE:
+            along = wp.dot(axis, torque)
+            rounding = ENOUGH_ROTATION
+        else:
+            rounding = ENOUGH_WAY
+        old = joints.axial[r]
+        w = 1.0 / inertia
+        free = place - (along + old) * w
+        went, slope, state = driven(
+            joints.drive, r * DRIVES, w, trees.opening[at].start, free, dt, joints.state[r], may
+        )
+        joints.state[r] = state
+        end = free + went
+        if slope != trees.opening[at].slope:
+            anew = 1
+        trees.opening[at].slope = slope
+        step = end - place
+        if wp.isinf(slope):
+            if kind == HINGE:
+                turn = turn + axis * step
+            else:
+                shift = shift + axis * step
+            force = force + push * step
+            torque = torque + twist * step
+            wrong = wp.max(wrong, wp.abs(step) - rounding)
+            trees.opening[at].gives = 0.0
+            trees.opening[at].drive = 0.0
+            if anew == 1:
+                trees.carried[at].a = a
+                trees.carried[at].b = b
+                trees.carried[at].c = c
+        else:
+            gives = 1.0 / (inertia + slope)
+            drive = went * inertia + slope * step - old - along
+            force = force + push * (gives * drive)
+            torque = torque + twist * (gives * drive)
+            trees.opening[at].gives = gives
+            trees.opening[at].drive = drive
+            if anew == 1:
+                far_push = gives * push
+                trees.carried[at].a = a - wp.outer(far_push, push)
+                trees.carried[at].b = b - wp.outer(far_push, twist)
+                trees.carried[at].c = c - wp.outer(gives * twist, twist)
+    elif kind == BALL:
+        # it turns with nothing: what is carried is a mass at its point
         if anew == 1:
-            made.along = along
-            made.about = about
-            made.push = made.whole.a * along + made.whole.b * about
-            made.twist = wp.transpose(made.whole.b) * along + made.whole.c * about
-            # directions that are not free get a 1 that nothing else meets
-            size = wp.trace(made.whole.c) + wp.trace(made.whole.a)
-            d = wp.transpose(along) * made.push + wp.transpose(about) * made.twist + stiff + (unit - free) * size
-            made.gives = free * inverted(d)
-            made.carried.a = made.whole.a - made.push * made.gives * wp.transpose(made.push)
-            made.carried.b = made.whole.b - made.push * made.gives * wp.transpose(made.twist)
-            made.carried.c = made.whole.c - made.twist * made.gives * wp.transpose(made.twist)
-        force = made.whole.force + made.whole.a * made.shift + made.whole.b * made.turn
-        torque = made.whole.torque + wp.transpose(made.whole.b) * made.shift + made.whole.c * made.turn
-        made.drive = aim - wp.transpose(made.along) * force - wp.transpose(made.about) * torque
-        made.carried.force = force + made.push * (made.gives * made.drive)
-        made.carried.torque = torque + made.twist * (made.gives * made.drive)
-    trees.opening[at] = made
+            swivel = inverted(c)
+            trees.opening[at].swivel = swivel
+            trees.carried[at].a = a - b * swivel * wp.transpose(b)
+            trees.carried[at].b = wp.mat33(0.0)
+            trees.carried[at].c = wp.mat33(0.0)
+        free_turn = trees.opening[at].swivel * -torque
+        turn = turn + free_turn
+        force = force + b * free_turn
+        torque = wp.vec3(0.0, 0.0, 0.0)
+    elif anew == 1:
+        trees.carried[at].a = a
+        trees.carried[at].b = b
+        trees.carried[at].c = c
+    trees.opening[at].shift = shift
+    trees.opening[at].turn = turn
+    trees.carried[at].force = force
+    trees.carried[at].torque = torque
     return wrong, anew

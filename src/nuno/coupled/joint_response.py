@@ -19,6 +19,7 @@ class Joints:
     body: wp.array(dtype=int)  # (count), among the coupled bodies
     slot: wp.array(dtype=int)  # (count)
     other: wp.array(dtype=int)  # (count), -1: the world
+    settles: wp.array(dtype=int)  # (count), 1 where no earlier joint has its body, and 2 more where none has its other
     place: wp.array(dtype=wp.vec3)  # (worlds * count), from the body's centre of mass, in its axes
     turn: wp.array(dtype=wp.quat)
     other_place: wp.array(dtype=wp.vec3)  # likewise of the other, or in the world

@@ -24,14 +24,23 @@ the other way. A substep's first pass has the states of the substep before, a fr
 
 import warp as wp
 
-from nuno.coupled.articulated_inertia import added, body_inertia, rest_of, seen_from
+from nuno.coupled.articulated_inertia import body_inertia, rest_of, seen_from
 from nuno.coupled.drive_constraints import project_ball
-from nuno.coupled.joint_constraints import ROUNDING
-from nuno.coupled.joint_opening import ROTATION_ROUNDING, Trees, arms_of, axis_before, begin_opening, open_joint
-from nuno.coupled.joint_response import BALL, HINGE, SLIDER, Joints, apply_joint, block_of
+from nuno.coupled.joint_opening import (
+    ENOUGH_ROTATION,
+    ENOUGH_WAY,
+    Trees,
+    arms_of,
+    axis_before,
+    begin_opening,
+    note_fit,
+    open_joint,
+)
+from nuno.coupled.joint_response import BALL, HINGE, SLIDER, Joints, block_of
 from nuno.coupled.pass_progress import Passing, goes_on, island_of
 from nuno.coupled.tie_constraints import within
-from nuno.rigid.rigid_body import RigidState
+from nuno.coupled.tree_replies import renew_replies
+from nuno.rigid.rigid_body import RigidState, shift_body, turn_body
 
 PIVOTED = wp.constant(1.0e-6)
 """[rad or m] What counts as wrong where friction held or slid otherwise before the pass: others go by that."""
@@ -39,42 +48,41 @@ PIVOTED = wp.constant(1.0e-6)
 
 @wp.func
 def close_joint(rigid: RigidState, joints: Joints, trees: Trees, world: int, t: int, dt: float):
-    """Let a joint follow its carrier, and move both by what it bears."""
+    """Let a joint follow its carrier, and add what it bears to what its bodies are moved by."""
     k = trees.joint[t]
     r = world * joints.count + k
+    at = world * trees.count + t
     nodes = world * (trees.count + trees.roots)
-    i = world * rigid.capacity + joints.slot[k]
-    j = int(-1)
-    if joints.other[k] >= 0:
-        j = world * rigid.capacity + joints.other[k]
-    opening = trees.opening[world * trees.count + t]
+    carrier = trees.carrier[t]
+    kind = joints.kind[k]
     shift = wp.vec3(0.0, 0.0, 0.0)
     turn = wp.vec3(0.0, 0.0, 0.0)
-    below = opening.arm
-    above = opening.other_arm
-    arm = below
-    other_arm = above
-    sign = float(1.0)
-    if trees.flipped[t] == 1:
-        arm = above
-        other_arm = below
-        sign = -1.0
-    if trees.carrier[t] >= 0 and opening.alone == 0:
-        turn = trees.turn[nodes + trees.carrier[t]]
-        shift = trees.shift[nodes + trees.carrier[t]] + wp.cross(turn, above)
-    pull = sign * (opening.carried.a * shift + opening.carried.b * turn + opening.carried.force)
-    twist = sign * (wp.transpose(opening.carried.b) * shift + opening.carried.c * turn + opening.carried.torque)
-    q = opening.gives * (opening.drive - wp.transpose(opening.push) * shift - wp.transpose(opening.twist) * turn)
-    turn = turn + opening.turn + opening.about * q
-    shift = shift + opening.shift + opening.along * q
+    sign = wp.where(trees.flipped[t] == 1, -1.0, 1.0)
+    if carrier >= 0 and trees.opening[at].alone == 0:
+        turn = trees.turn[nodes + carrier]
+        shift = trees.shift[nodes + carrier] + wp.cross(turn, trees.opening[at].reach)
+    carried = trees.carried[at]
+    pull = sign * (carried.a * shift + carried.b * turn + carried.force)
+    twist = sign * (shift * carried.b + carried.c * turn + carried.torque)
+    axis = trees.opening[at].axis
     # what drives a joint goes by where it ends, and looks again until that stays
-    at = world * trees.count + t
-    rounding = ROUNDING * (1.0 + wp.length(rigid.position[i]))
-    if joints.kind[k] == HINGE or joints.kind[k] == BALL:
-        rounding = ROTATION_ROUNDING
-    trees.wrong[at] = wp.max(trees.wrong[at], wp.length(q) - rounding)
-    trees.turn[nodes + t] = turn
-    trees.shift[nodes + t] = shift - wp.cross(turn, below)
+    went = float(0.0)
+    if kind == BALL:
+        held = shift * trees.node[nodes + t].b + trees.node[nodes + t].c * turn
+        ball_turn = trees.opening[at].swivel * -held
+        went = wp.length(ball_turn)
+        turn = turn + ball_turn
+    elif kind == HINGE or kind == SLIDER:
+        way = wp.dot(trees.opening[at].push, shift) + wp.dot(trees.opening[at].twist, turn)
+        q = trees.opening[at].gives * (trees.opening[at].drive - way)
+        went = wp.abs(q)
+        if kind == HINGE:
+            turn = turn + (sign * q) * axis
+        else:
+            shift = shift + (sign * q) * axis
+    trees.wrong[at] = wp.max(trees.wrong[at], went - wp.where(kind == SLIDER, ENOUGH_WAY, ENOUGH_ROTATION))
+    trees.turn[nodes + t] = turn + trees.opening[at].turn
+    trees.shift[nodes + t] = shift + trees.opening[at].shift
     limit = joints.limit[r] * dt * dt
     pull_sum = within(joints.pull[r] + pull, limit)
     twist_sum = within(joints.twist[r] + twist, limit)
@@ -82,33 +90,66 @@ def close_joint(rigid: RigidState, joints: Joints, trees: Trees, world: int, t: 
     twist = twist_sum - joints.twist[r]
     joints.pull[r] = pull_sum
     joints.twist[r] = twist_sum
-    axis = opening.axis
-    if joints.kind[k] == HINGE:
+    if kind == HINGE:
         joints.axial[r] = joints.axial[r] + wp.dot(axis, twist)
-    if joints.kind[k] == SLIDER:
+    if kind == SLIDER:
         joints.axial[r] = joints.axial[r] + wp.dot(axis, pull)
-    apply_joint(rigid, i, j, arm, other_arm, pull, twist)
+    pull = sign * pull
+    twist = sign * twist
+    n = nodes + t
+    trees.pull[n] = trees.pull[n] + pull
+    trees.twist[n] = trees.twist[n] + (wp.cross(trees.opening[at].arm, pull) + twist)
+    if carrier >= 0:
+        n = nodes + carrier
+        trees.pull[n] = trees.pull[n] - pull
+        trees.twist[n] = trees.twist[n] - (wp.cross(trees.opening[at].other_arm, pull) + twist)
 
 
 @wp.func
-def gather_node(rigid: RigidState, joints: Joints, trees: Trees, world: int, n: int):
-    """Add up the inertia of a body and of what it carries; the forces are there already."""
-    at = world * (trees.count + trees.roots) + n
+def slot_of_node(joints: Joints, trees: Trees, n: int):
+    """Return the slot of a node's body."""
     slot = int(0)
     if n >= trees.count:
         slot = trees.root[n - trees.count]
     else:
         k = trees.joint[n]
         slot = wp.where(trees.flipped[n] == 1, joints.other[k], joints.slot[k])
-    own = body_inertia(rigid, world * rigid.capacity + slot)
-    for back in range(trees.count):
-        t = trees.count - 1 - back
-        if trees.carrier[t] == n:
-            opening = world * trees.count + t
-            own = added(own, seen_from(trees.opening[opening].carried, trees.opening[opening].other_arm))
-    trees.node[at].a = own.a
-    trees.node[at].b = own.b
-    trees.node[at].c = own.c
+    return slot
+
+
+@wp.func
+def gather_node(rigid: RigidState, joints: Joints, trees: Trees, world: int, n: int):
+    """Add up the inertia of a body and of what it carries; the forces are there already."""
+    at = world * (trees.count + trees.roots) + n
+    arm = wp.vec3(0.0, 0.0, 0.0)
+    if n < trees.count:
+        arm = trees.opening[world * trees.count + n].arm
+    own = body_inertia(rigid, world * rigid.capacity + slot_of_node(joints, trees, n), arm)
+    a = own.a
+    b = own.b
+    c = own.c
+    t = trees.heir[n]
+    while t >= 0:
+        opening = world * trees.count + t
+        seen = seen_from(trees.carried[opening], trees.opening[opening].reach)
+        a = a + seen.a
+        b = b + seen.b
+        c = c + seen.c
+        t = trees.next_heir[t]
+    trees.node[at].a = a
+    trees.node[at].b = b
+    trees.node[at].c = c
+
+
+@wp.func
+def move_node(rigid: RigidState, joints: Joints, trees: Trees, passing: Passing, world: int, n: int):
+    """Move a node's body by what its joints bear of the pass, and contacts push."""
+    k = trees.joint[wp.where(n < trees.count, n, wp.max(trees.heir[n], 0))]
+    if goes_on(passing, island_of(passing, world, joints.body[k])):
+        i = world * rigid.capacity + slot_of_node(joints, trees, n)
+        at = world * (trees.count + trees.roots) + n
+        shift_body(rigid, i, rigid.weight[i] * trees.pull[at])
+        turn_body(rigid, i, rigid.give[i] * trees.twist[at])
 
 
 @wp.func
@@ -117,14 +158,26 @@ def project_trees(
 ):
     """One pass over all trees of a world; `trees.wrong` tells how far each joint was from where it should be."""
     nodes = world * (trees.count + trees.roots)
+    nothing = wp.vec3(0.0, 0.0, 0.0)
+    renewed = int(0)
     for n in range(trees.count + trees.roots):
         trees.stale[nodes + n] = wp.where(k_pass == 0, 1, 0)
-        trees.node[nodes + n].force = wp.vec3(0.0, 0.0, 0.0)
-        trees.node[nodes + n].torque = wp.vec3(0.0, 0.0, 0.0)
-    for t in range(trees.count):
-        trees.changed[world * trees.count + t] = 0
-        if k_pass == 0:
-            begin_opening(rigid, joints, trees, world, t, dt)
+        pushed = trees.pushed[nodes + n]
+        spun = trees.spun[nodes + n]
+        trees.pull[nodes + n] = pushed
+        trees.twist[nodes + n] = spun
+        if n < trees.count:
+            trees.changed[world * trees.count + n] = 0
+            if k_pass == 0:
+                begin_opening(rigid, joints, trees, world, n, dt)
+            note_fit(rigid, joints, trees, world, n)
+            spun = spun - wp.cross(trees.opening[world * trees.count + n].arm, pushed)
+        trees.node[nodes + n].force = -pushed
+        trees.node[nodes + n].torque = -spun
+        trees.pushed[nodes + n] = nothing
+        trees.spun[nodes + n] = nothing
+        trees.ahead[nodes + n] = nothing
+        trees.ahead_turn[nodes + n] = nothing
     for back in range(trees.count):
         t = trees.count - 1 - back
         k = trees.joint[t]
@@ -139,30 +192,36 @@ def project_trees(
                 trees.changed[at] = 1
                 wrong = wp.max(wrong, PIVOTED)
             trees.wrong[at] = wrong
+            renewed = wp.max(renewed, anew)
             if trees.carrier[t] >= 0:
                 n = nodes + trees.carrier[t]
                 if trees.carrier[t] < trees.count:
                     carrying = world * trees.count + trees.carrier[t]
                     trees.changed[carrying] = wp.max(trees.changed[carrying], trees.changed[at])
                 trees.stale[n] = wp.max(trees.stale[n], anew)
-                force = trees.opening[at].carried.force
-                arm = trees.opening[at].other_arm
+                force = trees.carried[at].force
                 trees.node[n].force = trees.node[n].force + force
-                trees.node[n].torque = trees.node[n].torque + (trees.opening[at].carried.torque + wp.cross(arm, force))
+                trees.node[n].torque = trees.node[n].torque + (
+                    trees.carried[at].torque + wp.cross(trees.opening[at].reach, force)
+                )
     for n in range(trees.roots):
         at = nodes + trees.count + n
-        shift = wp.vec3(0.0, 0.0, 0.0)
-        turn = wp.vec3(0.0, 0.0, 0.0)
+        shift = nothing
+        turn = nothing
         if rigid.weight[world * rigid.capacity + trees.root[n]] > 0.0:
             if trees.stale[at] == 1:
                 gather_node(rigid, joints, trees, world, trees.count + n)
             shift, turn = rest_of(trees.node[at])
         trees.shift[at] = shift
         trees.turn[at] = turn
+    if renewed == 1:
+        renew_replies(rigid, joints, trees, world)
     for t in range(trees.count):
         k = trees.joint[t]
         if goes_on(passing, island_of(passing, world, joints.body[k])):
             close_joint(rigid, joints, trees, world, t, dt)
+    for n in range(trees.count + trees.roots):
+        move_node(rigid, joints, trees, passing, world, n)
     for t in range(trees.count):
         k = trees.joint[t]
         if joints.kind[k] == BALL:

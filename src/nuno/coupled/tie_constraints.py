@@ -73,10 +73,9 @@ class Holds:
 @wp.func
 def within(v: wp.vec3, most: float):
     """A vector, no longer than ``most``."""
-    size = wp.length(v)
     result = v
-    if size > most:
-        result = v * (most / size)
+    if wp.length_sq(v) > most * most:
+        result = v * (most / wp.length(v))
     return result
 
 

@@ -22,6 +22,7 @@ from nuno.rigid.persistent_manifolds import (
     REACH,
     SPEED,
     TRAVEL,
+    WAITING,
     Contacts,
     moves,
     ready,
@@ -302,14 +303,38 @@ def refresh(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, p: int
 
 
 @wp.func
-def in_row(parts: Parts, c: Contacts, k: int, size: int):
-    """The k-th part and place in its row: row by row, or for many threads first places first, which are in use."""
-    p = k / c.row
-    place = k % c.row
-    if size > 1:
-        p = k % parts.count
-        place = k / parts.count
-    return p, place
+def list_entries(parts: Parts, c: Contacts, world: int):
+    """List the entries in use, row by row, so that one thread need not go through all places of all rows again."""
+    count = int(0)
+    for p in range(parts.count):
+        if parts.slot[p] >= 0:
+            first = (world * c.parts + p) * c.row
+            for k in range(c.row):
+                if c.partner[first + k] >= 0:
+                    c.waiting[world * c.parts * c.row + count] = first + k
+                    count = count + 1
+    c.counts[world * COUNTS + WAITING] = count
+
+
+@wp.func
+def places(parts: Parts, c: Contacts, world: int, size: int):
+    """Return how many places of rows there are to go through: of one thread those listed, see `entry_at`."""
+    count = parts.count * c.row
+    if size == 1:
+        count = c.counts[world * COUNTS + WAITING]
+    return count
+
+
+@wp.func
+def entry_at(parts: Parts, c: Contacts, world: int, k: int, size: int):
+    """The k-th part and entry: of those listed, or for many threads first places first, which are in use."""
+    base = world * c.parts * c.row
+    p = k % parts.count
+    e = base + p * c.row + k / parts.count
+    if size == 1:
+        e = c.waiting[base + k]
+        p = (e - base) / c.row
+    return p, e
 
 
 @wp.func
@@ -317,17 +342,15 @@ def refresh_rows(
     s: RigidState, parts: Parts, c: Contacts, world: int, dt: float, down: float, rank: int, size: int, crew: Any
 ):
     """All manifolds, and what the passes need of them."""
-    for k in range(rank, parts.count * c.row, size):
-        p, place = in_row(parts, c, k, size)
-        e = (world * c.parts + p) * c.row + place
+    for k in range(rank, places(parts, c, world, size), size):
+        p, e = entry_at(parts, c, world, k, size)
         if parts.slot[p] >= 0 and c.partner[e] >= 0 and c.patch[e] == 0:
             if may_act(s, parts, c, world, e, p) == 1:
                 refresh(s, parts, c, world, e, p, dt, down)
     # a mesh's first entry has found the points of the others
     wait_for(crew)
-    for k in range(rank, parts.count * c.row, size):
-        p, place = in_row(parts, c, k, size)
-        e = (world * c.parts + p) * c.row + place
+    for k in range(rank, places(parts, c, world, size), size):
+        p, e = entry_at(parts, c, world, k, size)
         if parts.slot[p] >= 0 and c.partner[e] >= 0 and c.count[e] > 0:
             if may_act(s, parts, c, world, e, p) == 1:
                 ready(s, parts, c, world, e, p, dt, down)

@@ -16,7 +16,16 @@ from typing import Any
 import warp as wp
 
 from nuno.numbers.block_group import all_resident, begin_grid_barrier, block_group_of, wait_for
-from nuno.rigid.broad_phase import Rules, end_listing, list_rows, measure, must_list, refresh_rows, reset_measures
+from nuno.rigid.broad_phase import (
+    Rules,
+    end_listing,
+    list_entries,
+    list_rows,
+    measure,
+    must_list,
+    refresh_rows,
+    reset_measures,
+)
 from nuno.rigid.convex import Parts
 from nuno.rigid.persistent_manifolds import COLOURS, COUNTS, ENTRIES, LEFT, OVERFLOW, Contacts, forget_impulses
 from nuno.rigid.rigid_body import RigidState, begin_body, move_body, push_body, read_velocity
@@ -55,6 +64,8 @@ def predict_worlds(
             return 0
         end_listing(s, c, world, run.dt, rank, size)
     wait_for(crew)
+    if size == 1:
+        list_entries(parts, c, world)
     for k in range(rank, s.capacity, size):
         begin_body(s, base + k, s.active[k])
     wait_for(crew)

@@ -83,13 +83,13 @@ def sift(parts: Parts, c: Contacts, base: int, root: int, end: int):
 
 @wp.func
 def line_up(s: RigidState, parts: Parts, c: Contacts, world: int, up: wp.vec3):
-    """One pass over all entries with points, the lowest first (a heap sort)."""
+    """One pass over all entries with points, the lowest first (a heap sort), of those that are listed as in use."""
     base = world * c.parts * c.row
     count = int(0)
-    for local in range(parts.count * c.row):
-        e = base + local
+    for k in range(c.counts[world * COUNTS + WAITING]):
+        e = c.waiting[base + k]
         if c.count[e] > 0:
-            if may_act(s, parts, c, world, e, local / c.row) == 1:
+            if may_act(s, parts, c, world, e, (e - base) / c.row) == 1:
                 c.height[e] = height_of(s, parts, c, world, e, up)
                 c.order[base + count] = e
                 count = count + 1

@@ -63,11 +63,17 @@ class CoupledJoints:
         specs: list[JointSpec] = [joint.spec for joint in joints]
         slots = [scene.slot_of(joint.body) for joint in joints]
         other_slots = [-1 if j.target is None else scene.slot_of(j.target) for j in joints]
+        seen: set[int | None] = {-1}
+        settles = []
+        for own_slot, other_slot in zip(slots, other_slots, strict=True):
+            settles.append((own_slot not in seen) + 2 * (other_slot not in seen))
+            seen |= {own_slot, other_slot}
         for name, numbers in (
             ("kind", [KINDS.index(spec.kind) for spec in specs]),
             ("body", [bodies.index(joint.body) for joint in joints]),
             ("slot", slots),
             ("other", other_slots),
+            ("settles", settles),
         ):
             setattr(self.table, name, wp.array(np.array(numbers, np.int32), dtype=int, device=self._device))
         self._put("place", places, wp.vec3)
