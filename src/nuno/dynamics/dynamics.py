@@ -21,6 +21,7 @@ from nuno.materials import Cloth, Material, Rigid, Soft
 from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import Pose, apply, compose, invert
 from nuno.shapes.shape import Plane, Shape
+from nuno.solvers.held_memory import hold_memory
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
@@ -171,6 +172,7 @@ class ParticleDynamics(Dynamics):
             topology_of(shape), material, positions, velocities, device=world.device, gravity=world.gravity,
             frame_rate=world.frame_rate, substeps=world.substeps, friction=friction,
         )  # fmt: skip
+        hold_memory(self.solver, world.device, self.solver.memory_bytes)
         self._pushing: tuple[Push, ...] = ()
 
     @property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +30,9 @@ def check_memory(world: Simulation, worlds: int, device: str, few: Callable[[int
         # a single world may have room for more than one of a batch has: a few are made to see
         each, host = world_bytes(few(MEASURED))
     needed = worlds * (each + host) if device == "cpu" else worlds * each
+    if needed > free:
+        gc.collect()  # of worlds that nobody refers to any more
+        free = free_bytes(device)
     if needed > free:
         most = int(free // max(needed / worlds, 1))
         raise NotEnoughMemoryError(f"{worlds} worlds", needed, free, f"{most} worlds fit")
