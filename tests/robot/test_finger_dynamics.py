@@ -176,6 +176,29 @@ def test_a_vector_of_all_angles_does_not_loosen_it(scene):
     assert robot.hands["right_hand"].held == ()
 
 
+@pytest.mark.parametrize("dynamics", [False, True])
+def test_a_vector_that_opens_the_fingers_lets_go_and_says_so(tmp_path, caplog, dynamics):
+    """With the hand's joint at 0, open, the cube falls freely, with and without dynamics; a warning names all once."""
+    world = nuno.World(device="cpu")
+    robot = lifter_in(tmp_path, world, dynamics=dynamics)
+    cube, kept = cube_in(world, mass=MASS)
+    hand = robot.hands["right_hand"]
+    assert robot.start_grasp("rarm", effort=30.0) == [True]
+    kept.release()
+    robot.angle_vector({"lift": 0.05}, 0.5)  # the joint that closes the hand stays as it is
+    robot.wait_interpolation()
+    assert hand.held == (cube,) and not caplog.records
+    held = cube.position[2]
+    robot.angle_vector({"turn": 0.0}, 0.5)
+    robot.wait_interpolation()
+    assert hand.held == () and hand.grips == () and hand.width == pytest.approx(0.08, abs=1e-3)
+    robot.sleep(0.3)
+    assert held - cube.position[2] > 0.5 * G * 0.3**2  # [m] of free fall, which began before
+    (record,) = caplog.records
+    assert all(part in record.getMessage() for part in ("right_hand", "cube", "'turn'", "controller_type"))
+    assert robot.stop_grasp("rarm") == [True] and len(caplog.records) == 1
+
+
 @pytest.mark.long
 def test_talos_lifts_a_cube_with_its_fingers():
     """Its arm swings 0.2 kg by 0.4 m in 1 s between the tips of its gripper: the cube slides by less than 0.1 mm."""
