@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,6 +25,13 @@ if TYPE_CHECKING:
     from nuno.robot.simulated_gripper import SimulatedGripper
     from nuno.robot.simulated_joints import SimulatedJoints
     from nuno.robot.wanted_motion import WantedMotion
+
+logger = logging.getLogger(__name__)
+
+TORN = 0.05
+"""[m] From how far apart on a joint counts as torn; loads leave micrometres, and a millimetre for a moment."""
+WHOLE = 0.01
+"""[m] Below it, all joints count as whole again."""
 
 
 class SimulatedBody(SimulatedSenses):
@@ -50,6 +58,7 @@ class SimulatedBody(SimulatedSenses):
     guard: MotionGuard
     _burden: Burden
     _entered: bool
+    _is_torn = False  # and that was told
 
     @property
     def is_dynamic(self) -> bool:
@@ -162,6 +171,32 @@ class SimulatedBody(SimulatedSenses):
             self._start_from(self.actual.configuration())
             if was_dynamic:
                 self.attach()
+
+    def _tell_torn(self) -> None:
+        """Warn, once until they are whole again, where forces have torn joints of a robot with dynamics apart."""
+        assert self.balance is not None
+        dynamics = self.balance.dynamics
+        gaps = dynamics.gaps()[0]
+        farthest = float(gaps.max(initial=0.0))
+        if farthest < (WHOLE if self._is_torn else TORN):
+            self._is_torn = False
+            return
+        if self._is_torn:
+            return
+        self._is_torn = True
+        worst, torn = int(gaps.argmax()), int((gaps > TORN).sum())
+        joint = (*dynamics.joints, *dynamics.fingers.joints)[worst]
+        names = self.actual.joint_names
+        name = repr(names[worst]) if worst < len(names) else f"the slide of {joint.body.name!r}"
+        others = f" and {torn - 1} more are more than {100.0 * TORN:g} cm" if torn > 1 else " is"
+        pressed = sorted({other for own in self._state.contacts.values() for other in own})
+        logger.warning(
+            "%r is torn at t = %.3f s: %s%s apart, by %.3g m at most: greater forces pulled at its links than joints bear, "
+            "mostly as something stands inside a link (it touches %s). What it does from here on is not to be believed. "
+            "Move what overlaps its links away, or let their contact be ignored (world.ignore_contact), and call "
+            "robot.set_up(), or restore a snapshot",
+            self.actual.name, self.world.time, name, others, farthest, ", ".join(pressed) or "nothing",
+        )  # fmt: skip
 
     def _set_tolerance(self) -> None:
         """Let goals without tolerances end with their time where motors move the joints, as on robots with motors."""

@@ -145,6 +145,8 @@ class SimulatedGripper:
         if joint is None or not held:
             self._hold_width = None
             return
+        if self._motion is not None and not self._motion.is_done:
+            return  # a gripper's goal moves the fingers
         if presses:
             wanted, width = self._wanted_width(joint), hand.width
         else:

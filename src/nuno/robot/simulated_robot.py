@@ -327,6 +327,7 @@ class SimulatedRobot(SimulatedBody):
             ended = self.balance.ended(max(self.world.time - self._state.time, 1e-9))
             self._state = self.balance.judge([self._state], [self._motion.aim], ended, self.world.time)[0]
             self._motion.take_footing(self._state)
+            self._tell_torn()
             angles = self.actual.angles_of(self._state.q)
             self.actual.move_to(angles, self._state.q[:7])
             actual = (angles, self._state.v[6:], self._state.a[6:])
