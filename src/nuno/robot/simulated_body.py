@@ -191,10 +191,10 @@ class SimulatedBody(SimulatedSenses):
         others = f" and {torn - 1} more are more than {100.0 * TORN:g} cm" if torn > 1 else " is"
         pressed = sorted({other for own in self._state.contacts.values() for other in own})
         logger.warning(
-            "%r is torn at t = %.3f s: %s%s apart, by %.3g m at most: greater forces pulled at its links than joints bear, "
-            "mostly as something stands inside a link (it touches %s). What it does from here on is not to be believed. "
-            "Move what overlaps its links away, or let their contact be ignored (world.ignore_contact), and call "
-            "robot.set_up(), or restore a snapshot",
+            "%r is torn at t = %.3f s: %s%s apart, by %.3g m at most: greater forces pulled at its links than joints "
+            "bear, mostly as something stands inside a link (it touches %s). What it does from here on is not to be "
+            "believed. Move what overlaps its links away, or let their contact be ignored (world.ignore_contact), and "
+            "call robot.set_up(), or restore a snapshot",
             self.actual.name, self.world.time, name, others, farthest, ", ".join(pressed) or "nothing",
         )  # fmt: skip
 
