@@ -246,8 +246,8 @@ class Rigid(Material):
         centre_of_mass: (3,) [m] in the body's frame, or None for that of the volume.
 
     Raises:
-        InvalidInputError: a value is not finite, negative, zero where it must be positive, a restitution above 1, or
-            an inertia that no mass has.
+        InvalidInputError: a value is not finite, negative, zero where it must be positive, a restitution above 1, an
+            inertia that no mass has, or a mass besides another density than the default.
     """
 
     density: Value = 1000.0
@@ -265,6 +265,11 @@ class Rigid(Material):
         super().__post_init__()
         if np.max(self.restitution) > 1.0:
             raise InvalidInputError(f"restitution must be at most 1, got {self.restitution!r}")
+        if self.mass is not None and np.any(np.asarray(self.density) != type(self).density):
+            raise InvalidInputError(
+                f"mass and density say the same thing, got mass={self.mass!r} and density={self.density!r}: give one of "
+                "them (the mass of the whole body, or the density for that of its volume)"
+            )
 
     def _checked(self, name: str, value: Any) -> Any:
         if value is None and name in ("mass", "inertia", "centre_of_mass"):
