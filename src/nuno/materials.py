@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.errors import InvalidInputError, UnknownNameError
-from nuno.validation import checked, count, finite_array, flag, index_array
+from nuno.validation import GREATEST, checked, count, finite_array, flag, index_array
 
 Value = Any  # a number, or an array (worlds,), (elements,) or (worlds, elements)
 Directed = Any  # a Value for all directions, or a tuple (warp, weft) of two
@@ -267,8 +267,8 @@ class Rigid(Material):
             raise InvalidInputError(f"restitution must be at most 1, got {self.restitution!r}")
         if self.mass is not None and np.any(np.asarray(self.density) != type(self).density):
             raise InvalidInputError(
-                f"mass and density say the same thing, got mass={self.mass!r} and density={self.density!r}: give one of "
-                "them (the mass of the whole body, or the density for that of its volume)"
+                f"mass and density say the same thing, got mass={self.mass!r} and density={self.density!r}: give one, "
+                "the mass of the whole body or the density of its volume"
             )
 
     def _checked(self, name: str, value: Any) -> Any:
@@ -319,6 +319,8 @@ def _checked(name: str, value: Any, *, zero: bool, deepest: int) -> Any:
         raise InvalidInputError(f"{name} must be a number or an array of at most {deepest} axes, got {array.shape}")
     if not np.isfinite(array).all() or (array < 0.0).any() or (not zero and (array == 0.0).any()):
         raise InvalidInputError(f"{name} must be {valid}, got {value!r}")
+    if array.max() > GREATEST:
+        raise InvalidInputError(f"{name} must be at most {GREATEST:.3g}, the greatest float, got {array.max():.3g}")
     array.setflags(write=False)
     return float(array) if array.ndim == 0 else array
 

@@ -92,8 +92,8 @@ def check_depth(depth: Any, camera: Camera) -> np.ndarray:
     behind = (given < 0) & np.isfinite(given)
     if behind.any():
         raise ImageError(
-            f"depth is negative in {int(behind.sum())} pixels, {float(given[behind].min()):.3g} m at least: it goes from "
-            "the camera along its axis, and what is not known is 0, NaN or infinite"
+            f"depth is negative in {int(behind.sum())} pixels, {float(given[behind].min()):.3g} m at least: it goes "
+            "from the camera along its axis, and what is not known is 0, NaN or infinite"
         )
     return given
 
