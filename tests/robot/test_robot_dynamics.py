@@ -252,6 +252,28 @@ def test_a_joint_that_is_torn_apart_is_told_once(tmp_path, caplog):
     assert robot.balance.dynamics.gaps().max() < 1e-6  # [m], floats
 
 
+@pytest.mark.parametrize("link", ["palm", "a"])
+def test_a_link_that_was_detached_by_itself_is_named_with_its_cure(tmp_path, link):
+    """Frames are refused, and both cures that the error names join the links anew: the joints bear them again."""
+    world = nuno.World(device="cpu")
+    robot = lifter_in(tmp_path, world, dynamics=True)
+    body = robot.links.bodies[robot.links.names.index(link)]
+    for cure in (robot.set_up, lambda: (robot.detach(), robot.attach())):
+        world.detach(body)
+        with pytest.raises(BodyStateError, match=r"was released.*robot.set_up\(\)"):
+            robot.sleep(1 / 60)
+        cure()
+        robot.sleep(2 / 60)
+        assert body.is_dynamic and robot.balance.dynamics.gaps().max() < 1e-6  # [m], floats
+    world.remove(body)
+    with pytest.raises(BodyStateError, match=f"add 'lifter/{link}' to the world"):
+        robot.sleep(1 / 60)
+    world.add(body)
+    robot.set_up()
+    robot.sleep(2 / 60)
+    assert robot.balance.dynamics.gaps().max() < 1e-6
+
+
 def test_bad_calls_are_named():
     """Links of another kind, attached twice, detached twice."""
     world = nuno.World(device="cpu")

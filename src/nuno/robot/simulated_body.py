@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from nuno.robot.humanoid import Humanoid
     from nuno.robot.links import Links
     from nuno.robot.motion_guard import MotionGuard
+    from nuno.robot.robot_state import RobotState
+    from nuno.robot.servo import Servo
     from nuno.robot.simulated_gripper import SimulatedGripper
     from nuno.robot.simulated_joints import SimulatedJoints
     from nuno.robot.wanted_motion import WantedMotion
@@ -58,6 +60,7 @@ class SimulatedBody(SimulatedSenses):
     guard: MotionGuard
     _burden: Burden
     _entered: bool
+    _servo: Servo | None
     _is_torn = False  # and that was told
 
     @property
@@ -171,6 +174,24 @@ class SimulatedBody(SimulatedSenses):
             self._start_from(self.actual.configuration())
             if was_dynamic:
                 self.attach()
+
+    def _drive(self, aim: RobotState, span: float) -> None:
+        """Set the motors for a frame of ``span`` [s] at whose end the robot is wanted at ``aim``.
+
+        Raises:
+            BodyStateError: somebody took dynamics from a link alone, or the link from the world.
+        """
+        assert self.balance is not None
+        try:
+            self.balance.dynamics.drive(*self.balance.command([self._state], [aim], span, self._servo))
+            self.balance.dynamics.lead_fingers(self.actual.angles_of(aim.q))
+        except BodyStateError as error:
+            first = f"add {self.links.missing[0]!r} to the world again, then " if self.links.missing else ""
+            raise BodyStateError(
+                f"{error}, as its link was detached or removed by itself, and {self.actual.name!r} cannot move without "
+                f"it: {first}robot.set_up(), or robot.detach() and robot.attach(), join its links anew; restoring a "
+                "snapshot does so, too"
+            ) from error
 
     def _tell_torn(self) -> None:
         """Warn, once until they are whole again, where forces have torn joints of a robot with dynamics apart."""

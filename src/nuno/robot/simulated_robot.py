@@ -310,9 +310,8 @@ class SimulatedRobot(SimulatedBody):
             self._motion.cancel()
             self.servo(None)
             aim = self._motion.begin(end, span)
-        if self.balance is not None and self.is_dynamic:
-            self.balance.dynamics.drive(*self.balance.command([self._state], [aim], span, self._servo))
-            self.balance.dynamics.lead_fingers(self.actual.angles_of(aim.q))
+        if self.is_dynamic:
+            self._drive(aim, span)
             return
         self._state = aim
         if aim.q is not before.q and np.count_nonzero(aim.q != before.q):
