@@ -17,6 +17,7 @@ from nuno.robot.humanoid import Humanoid
 from nuno.robot.joint_interface import Controller
 from nuno.robot.loads import LinkLoads
 from nuno.robot.motion_guard import MotionGuard
+from nuno.robot.overlapping_robots import warn_of_overlaps
 from nuno.robot.readings import JointState
 from nuno.robot.robot_state import RobotState
 from nuno.robot.sensor_model import SensorModel
@@ -113,6 +114,7 @@ class SimulatedRobot(SimulatedBody):
         self._before: RobotState | None = None  # its state when the frame began
         self._due = wall_clock.perf_counter()
         self._state = self._motion.aim
+        warn_of_overlaps(self.links, [own.links for own in world.drivers if isinstance(own, SimulatedRobot)])
         if dynamics:
             self.attach()
         with world.lock:
