@@ -162,6 +162,28 @@ def test_dynamics_come_and_go_with_something_in_the_hand(scene):
     assert start - height(cube)(robot) > 0.1
 
 
+def test_detached_fingers_are_where_the_joints_say(scene):
+    """A cube 6 mm aside pushed both fingers aside by more than 1 mm; their links' poses tell where they are then."""
+    world, robot, cube, kept = scene
+    kept.release()
+    world.grip(cube, to=np.add(cube.position, (0.0, 0.006, 0.0)))
+    robot.start_grasp("rarm", effort=30.0)
+
+    def aside():
+        places, turns = robot.links.poses()
+        assert len(places) == len(robot.links.bodies)
+        return max(
+            np.linalg.norm(body.position - place) + np.linalg.norm(body.quaternion - turn)
+            for body, place, turn in zip(robot.links.bodies, places, turns, strict=True)
+        )
+
+    assert aside() > 1e-3  # [m]
+    robot.detach()
+    assert aside() < 1e-12  # doubles
+    world.run(0.1)
+    assert aside() < 1e-12
+
+
 def test_a_vector_of_all_angles_does_not_loosen_it(scene):
     """Angles as they are now, sent to all joints: the closed hand presses on; wanted open by its joint, it opens."""
     world, robot, _, kept = scene

@@ -143,6 +143,9 @@ class SimulatedBody(SimulatedSenses):
     def detach(self) -> None:
         """Take the dynamics away: the robot stands still in its posture, and goes exactly where it is sent from now on.
 
+        The links are where the joints say, also fingers, of which one had slid further than another: they jump by half
+        of what they differ.
+
         Raises:
             BodyStateError: it has none.
         """
@@ -151,6 +154,7 @@ class SimulatedBody(SimulatedSenses):
                 raise BodyStateError(f"{self.actual.name!r} has no dynamics")
             pressed = {name: hand.held for name, hand in self.hands.items() if hand.presses}
             self.balance.dynamics.detach()
+            self.links.follow(0.0)  # fingers slid apart, each as far as its own forces had it
             for name, bodies in pressed.items():  # what fingers pressed on is gripped from now on
                 self.hands[name].close([body for body in bodies if body.is_dynamic])
             self._set_tolerance()
