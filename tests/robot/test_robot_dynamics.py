@@ -272,6 +272,11 @@ def test_a_link_that_was_detached_by_itself_is_named_with_its_cure(tmp_path, lin
     robot.set_up()
     robot.sleep(2 / 60)
     assert robot.balance.dynamics.gaps().max() < 1e-6
+    world.remove(body)
+    robot.detach()
+    assert not robot.is_dynamic
+    robot.leave()
+    assert not world.bodies and not world.drivers
 
 
 def test_bad_calls_are_named():

@@ -154,7 +154,8 @@ class SimulatedBody(SimulatedSenses):
                 raise BodyStateError(f"{self.actual.name!r} has no dynamics")
             pressed = {name: hand.held for name, hand in self.hands.items() if hand.presses}
             self.balance.dynamics.detach()
-            self.links.follow(0.0)  # fingers slid apart, each as far as its own forces had it
+            if not self.links.missing:
+                self.links.follow(0.0)  # fingers slid apart, each as far as its own forces had it
             for name, bodies in pressed.items():  # what fingers pressed on is gripped from now on
                 self.hands[name].close([body for body in bodies if body.is_dynamic])
             self._set_tolerance()
