@@ -221,6 +221,29 @@ def test_a_vector_that_opens_the_fingers_lets_go_and_says_so(tmp_path, caplog, d
     assert robot.stop_grasp("rarm") == [True] and len(caplog.records) == 1
 
 
+def test_what_a_hand_takes_anew_it_keeps_at_its_new_width(tmp_path, caplog):
+    """A cube of 7 cm in place of one of 3 cm: the fingers are further apart than with the first, and hold it."""
+    world = nuno.World(device="cpu")
+    robot = lifter_in(tmp_path, world)
+    hand, held = robot.hands["right_hand"], []
+    for edge in (0.03, 0.07):
+        cube, kept = cube_in(world, edge=edge)
+        assert robot.start_grasp("rarm") == [True]
+        kept.release()
+        world.run(0.1)
+        held.append(hand.width)
+        assert hand.held == (cube,)
+        if edge == 0.03:
+            saved = world.save()
+            robot.stop_grasp("rarm")
+            world.remove(cube)
+    assert held == pytest.approx([0.03, 0.07], abs=1e-6) and not caplog.records
+    world.restore(saved)
+    robot.angle_vector({"turn": 0.0}, 0.5)
+    robot.wait_interpolation()
+    assert hand.held == () and "from 0.030 m" in caplog.text
+
+
 @pytest.mark.long
 def test_talos_lifts_a_cube_with_its_fingers():
     """Its arm swings 0.2 kg by 0.4 m in 1 s between the tips of its gripper: the cube slides by less than 0.1 mm."""

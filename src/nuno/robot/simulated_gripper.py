@@ -14,6 +14,7 @@ from nuno.robot.simulated_joints import SimulatedJoints
 from nuno.robot.trajectory import JointTrajectory
 
 if TYPE_CHECKING:
+    from nuno.joints.grip import Grip
     from nuno.robot.finger_dynamics import FingerDynamics
     from nuno.robot.robot_state import Contacts
 
@@ -55,7 +56,7 @@ class SimulatedGripper:
         self._motion: Goal | None = None
         self._closes, self._width = False, hand.description.width
         self._aim, self._last, self._waited = hand.description.width, hand.description.width, 0
-        self._hold_width: float | None = None  # how far apart the fingers were when they were first seen to grip
+        self._hold: tuple[tuple[Grip, ...], float] = ((), 0.0)  # grips, and how far apart the fingers were with them
         joint = hand.description.joint
         self._controller = next((name for name, own in joints.controllers.items() if joint in own.names), None)
 
@@ -123,7 +124,7 @@ class SimulatedGripper:
         """Return all that it is, for ``load``."""
         status = None if self.goal is None else (self.goal.status, self.goal.text)
         motion = (
-            self._motion, self._closes, self._width, self._aim, self._last, self._waited, self.effort, self._hold_width
+            self._motion, self._closes, self._width, self._aim, self._last, self._waited, self.effort, self._hold
         )  # fmt: skip
         return self.goal, status, motion, self.hand.grips, self.hand.pressed
 
@@ -131,7 +132,7 @@ class SimulatedGripper:
         """Become what it was."""
         self.goal, status, motion, grips, self.hand.pressed = saved
         self._motion, self._closes, self._width, self._aim, self._last, self._waited, self.effort = motion[:7]
-        self._hold_width = motion[7]
+        self._hold = motion[7]
         if self.goal is not None:
             self.goal.status, self.goal.text = status
         self.hand._grips = list(grips)
@@ -141,9 +142,8 @@ class SimulatedGripper:
         hand, fingers = self.hand, self._fingers
         joint = hand.description.joint
         presses = hand.presses and fingers is not None and fingers.closed[hand.name]
-        held = hand.held if presses else tuple(grip.body for grip in hand.grips)
-        if joint is None or not held:
-            self._hold_width = None
+        held, grips = (hand.held, ()) if presses else ((), hand.grips)
+        if joint is None or not (held or grips):
             return
         if self._motion is not None and not self._motion.is_done:
             return  # a gripper's goal moves the fingers
@@ -151,7 +151,9 @@ class SimulatedGripper:
             wanted, width = self._wanted_width(joint), hand.width
         else:
             wanted = hand.width
-            width = self._hold_width = wanted if self._hold_width is None else self._hold_width
+            if grips != self._hold[0]:
+                self._hold = grips, wanted
+            width, held = self._hold[1], tuple(grip.body for grip in grips)
         if wanted <= width + LOOSE:
             return
         names = " and ".join(sorted({body.name for body in held}))
@@ -163,7 +165,6 @@ class SimulatedGripper:
         if presses and fingers is not None:
             fingers.closed[hand.name] = False
         hand.open()
-        self._hold_width = None
 
     def _wanted_width(self, joint: str) -> float:
         """Return how far apart the fingers are wanted [m]."""
