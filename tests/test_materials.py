@@ -93,10 +93,12 @@ def test_presets():
         (Rigid, {"inertia": np.diag([1.0, 1.0, 3.0])}),
         (Rigid, {"inertia": [1.0, 1.0, 1.0]}),
         (Rigid, {"density": [[1.0]]}),
+        (Rigid, {"mass": 1.0, "density": 2.0}),
+        (Rigid, {"mass": [1.0, 2.0], "density": [1000.0, 2.0]}),
     ],
 )
 def test_bad_values_of_solids(kind, values):
-    """Every bad value of a soft or rigid material is named, an inertia that no mass has among them."""
+    """Every bad value of a soft or rigid material is named; an inertia that no mass has, a mass and a density, too."""
     with pytest.raises(InvalidInputError, match=next(iter(values))):
         kind(**values)
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.errors import InvalidInputError, UnknownNameError
-from nuno.validation import checked, count, finite_array, flag, index_array
+from nuno.validation import GREATEST, checked, count, finite_array, flag, index_array
 
 Value = Any  # a number, or an array (worlds,), (elements,) or (worlds, elements)
 Directed = Any  # a Value for all directions, or a tuple (warp, weft) of two
@@ -246,8 +246,8 @@ class Rigid(Material):
         centre_of_mass: (3,) [m] in the body's frame, or None for that of the volume.
 
     Raises:
-        InvalidInputError: a value is not finite, negative, zero where it must be positive, a restitution above 1, or
-            an inertia that no mass has.
+        InvalidInputError: a value is not finite, negative, zero where it must be positive, a restitution above 1, an
+            inertia that no mass has, or a mass besides another density than the default.
     """
 
     density: Value = 1000.0
@@ -265,6 +265,11 @@ class Rigid(Material):
         super().__post_init__()
         if np.max(self.restitution) > 1.0:
             raise InvalidInputError(f"restitution must be at most 1, got {self.restitution!r}")
+        if self.mass is not None and np.any(np.asarray(self.density) != type(self).density):
+            raise InvalidInputError(
+                f"mass and density say the same thing, got mass={self.mass!r} and density={self.density!r}: give one, "
+                "the mass of the whole body or the density of its volume"
+            )
 
     def _checked(self, name: str, value: Any) -> Any:
         if value is None and name in ("mass", "inertia", "centre_of_mass"):
@@ -314,6 +319,8 @@ def _checked(name: str, value: Any, *, zero: bool, deepest: int) -> Any:
         raise InvalidInputError(f"{name} must be a number or an array of at most {deepest} axes, got {array.shape}")
     if not np.isfinite(array).all() or (array < 0.0).any() or (not zero and (array == 0.0).any()):
         raise InvalidInputError(f"{name} must be {valid}, got {value!r}")
+    if array.max() > GREATEST:
+        raise InvalidInputError(f"{name} must be at most {GREATEST:.3g}, the greatest float, got {array.max():.3g}")
     array.setflags(write=False)
     return float(array) if array.ndim == 0 else array
 

@@ -29,6 +29,8 @@ LONGEST_WAIT = 3600.0
 """[s] The longest that a pick is lifted, or a fold or a load waited for, frame by frame in memory."""
 MAX_COUNT = 2**31 - 1
 """A count beyond this fits no index of a kernel."""
+GREATEST = float(np.finfo(np.float32).max)
+"""The greatest number that a world holds: its state is in floats."""
 
 _field_rules: dict[type, list[tuple[str, Rule]]] = {}  # of dataclasses, by field
 
@@ -43,7 +45,7 @@ def finite_array(name: str, value: Any, *shapes: Shape, error: type[Exception] =
         error: The error to raise.
 
     Raises:
-        InvalidInputError: (or ``error``) not numbers, not finite, or of another shape.
+        InvalidInputError: (or ``error``) not numbers, not finite, beyond what floats hold, or of another shape.
     """
     try:
         array = np.array(value)
@@ -56,6 +58,8 @@ def finite_array(name: str, value: Any, *shapes: Shape, error: type[Exception] =
         raise error(f"{name} must have shape {_shape_text(shapes)}, got {array.shape}")
     if not np.isfinite(array).all():
         raise error(f"{name} must be finite, got {np.count_nonzero(~np.isfinite(array))} values that are not")
+    if array.size and max(array.max(), -array.min()) > GREATEST:
+        raise error(f"{name} must be within +-{GREATEST:.3g}, the greatest float, got {np.abs(array).max():.3g}")
     return array
 
 
@@ -95,9 +99,11 @@ def number(name: str, value: Any, *, low: float = -np.inf, above: float = -np.in
     """Return ``value`` as a finite float with low <= value <= high and value > above.
 
     Raises:
-        InvalidInputError: not a number, not finite, or out of range.
+        InvalidInputError: not a number, not finite, out of range, or beyond what floats of 32 bits hold.
     """
-    if type(value) is float and low <= value <= high and above < value < np.inf:  # what every tick asks
+    if (
+        type(value) is float and low <= value <= high and above < value <= GREATEST and value >= -GREATEST
+    ):  # what every tick asks
         return value
     valid = f"> {above:g}" if above > -np.inf else f">= {low:g}" if low > -np.inf else "finite"
     if high < np.inf:
@@ -111,6 +117,8 @@ def number(name: str, value: Any, *, low: float = -np.inf, above: float = -np.in
         raise InvalidInputError(f"{name} must be {wanted}, got {_short(value)}") from problem
     if not np.isfinite(result) or result < low or result <= above or result > high:
         raise InvalidInputError(f"{name} must be {valid}, got {result}")
+    if abs(result) > GREATEST:
+        raise InvalidInputError(f"{name} must be within +-{GREATEST:.3g}, the greatest float, got {result:.3g}")
     return result
 
 

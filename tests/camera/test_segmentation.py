@@ -12,6 +12,7 @@ from synthetic import LOOKS, Pair, look_at, make_pair
 from few_variants import few
 from nuno.camera.camera import Camera
 from nuno.camera.image import read_image
+from nuno.camera.scene_without_cloth import compare
 from nuno.camera.segmentation import look_after, segment_after, segment_before
 from nuno.camera.table import Table, plane_coordinates, table_margin
 from nuno.errors import ClothNotFoundError, ImageError, InvalidInputError
@@ -271,6 +272,19 @@ def test_nothing_in_the_hand(striped: Pair) -> None:
     bare = make_pair(LOOKS[BY_NAME["blue stripes on wood"]], 500 + BY_NAME["blue stripes on wood"], lift=False).after
     with pytest.raises(ClothNotFoundError):
         segment_after(bare, striped.camera, striped.table, striped.before, striped.mask_before, striped.hand)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_black_image_has_no_cloth(striped: Pair) -> None:
+    """Nor has one in which a channel is black a gain for it; NumPy warns of no division by it."""
+    known = (striped.camera, striped.table, striped.before, striped.mask_before, striped.hand)
+    with pytest.raises(ClothNotFoundError, match="colours of the cloth"):
+        segment_after(np.zeros_like(striped.after), *known)
+    background = compare(
+        striped.before, striped.after * np.array((1, 0, 1), np.uint8), striped.mask_before,
+        np.ones_like(striped.mask_before), np.zeros_like(striped.mask_before),
+    )  # fmt: skip
+    assert np.isfinite(background.density()).all()
 
 
 def test_hand_far_away(striped: Pair) -> None:

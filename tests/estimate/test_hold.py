@@ -1,6 +1,7 @@
 """By which point a garment is held: candidates, symmetries, images, and small cases."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -139,6 +140,18 @@ def test_results_are_written(holds, tmp_path):
     everywhere = np.ones_like(mask)
     odd = nuno.estimate_hold(holds.garment, everywhere, camera, HAND, holds=holds)
     assert any("overlaps" in warning for warning in odd.warnings)
+
+
+def test_a_single_candidate_is_not_called_sure(holds):
+    """It has no rival, so that its probability is 1 whatever is seen: a warning says so."""
+    camera = camera_at(0.0)
+    mask = hold_masks(holds, [(0, 1)], [0.0], camera, HAND)[0]
+    result = nuno.estimate_hold(holds.garment, mask, camera, HAND, holds=holds)
+    assert not any("only one candidate" in warning for warning in result.warnings)
+    alone = replace(
+        result, holds=replace(holds, candidates=holds.candidates[:1]), probabilities=np.ones(1), order=np.array([0])
+    )
+    assert "only one candidate" in alone.warnings[-1]
 
 
 def test_bad_input_is_refused(holds, sock):

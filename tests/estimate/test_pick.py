@@ -314,6 +314,17 @@ def test_a_doubtful_answer_says_how_likely_it_is(small):
     assert "(1, 1)" in other.warnings[0] and "almost as well" in other.warnings[0]
 
 
+def test_a_single_candidate_is_not_called_sure(small):
+    """It has no rival, so that its probability is 1 whatever is seen: a warning says so, of every score."""
+    for name in ("log_evidence", "iou"):
+        alone = replace(
+            small, labels=small.labels[:1], scores=np.array([0.5]), order=np.array([0]), score_name=name,
+            seen_warnings=(),
+        )  # fmt: skip
+        assert alone.confidence == 1.0 and "only one candidate" in " ".join(alone.warnings)
+        assert str(alone.to_dict()["warnings"]).count("only one candidate") == 1
+
+
 @pytest.mark.parametrize(("score", "name"), [("iou", "iou"), ("eq1", "eq1")])
 def test_other_scores(score, name, result, seen):
     """They rank by another measure; the paper's is what eq1 reports."""

@@ -162,6 +162,28 @@ def test_dynamics_come_and_go_with_something_in_the_hand(scene):
     assert start - height(cube)(robot) > 0.1
 
 
+def test_detached_fingers_are_where_the_joints_say(scene):
+    """A cube 6 mm aside pushed both fingers aside by more than 1 mm; their links' poses tell where they are then."""
+    world, robot, cube, kept = scene
+    kept.release()
+    world.grip(cube, to=np.add(cube.position, (0.0, 0.006, 0.0)))
+    robot.start_grasp("rarm", effort=30.0)
+
+    def aside():
+        places, turns = robot.links.poses()
+        assert len(places) == len(robot.links.bodies)
+        return max(
+            np.linalg.norm(body.position - place) + np.linalg.norm(body.quaternion - turn)
+            for body, place, turn in zip(robot.links.bodies, places, turns, strict=True)
+        )
+
+    assert aside() > 1e-3  # [m]
+    robot.detach()
+    assert aside() < 1e-12  # doubles
+    world.run(0.1)
+    assert aside() < 1e-12
+
+
 def test_a_vector_of_all_angles_does_not_loosen_it(scene):
     """Angles as they are now, sent to all joints: the closed hand presses on; wanted open by its joint, it opens."""
     world, robot, _, kept = scene
@@ -174,6 +196,52 @@ def test_a_vector_of_all_angles_does_not_loosen_it(scene):
     robot.angle_vector({"turn": 0.0}, 0.5)
     robot.wait_interpolation()
     assert robot.hands["right_hand"].held == ()
+
+
+@pytest.mark.parametrize("dynamics", [False, True])
+def test_a_vector_that_opens_the_fingers_lets_go_and_says_so(tmp_path, caplog, dynamics):
+    """With the hand's joint at 0, open, the cube falls freely, with and without dynamics; a warning names all once."""
+    world = nuno.World(device="cpu")
+    robot = lifter_in(tmp_path, world, dynamics=dynamics)
+    cube, kept = cube_in(world, mass=MASS)
+    hand = robot.hands["right_hand"]
+    assert robot.start_grasp("rarm", effort=30.0) == [True]
+    kept.release()
+    robot.angle_vector({"lift": 0.05}, 0.5)  # the joint that closes the hand stays as it is
+    robot.wait_interpolation()
+    assert hand.held == (cube,) and not caplog.records
+    held = cube.position[2]
+    robot.angle_vector({"turn": 0.0}, 0.5)
+    robot.wait_interpolation()
+    assert hand.held == () and hand.grips == () and hand.width == pytest.approx(0.08, abs=1e-3)
+    robot.sleep(0.3)
+    assert held - cube.position[2] > 0.5 * G * 0.3**2  # [m] of free fall, which began before
+    (record,) = caplog.records
+    assert all(part in record.getMessage() for part in ("right_hand", "cube", "'turn'", "controller_type"))
+    assert robot.stop_grasp("rarm") == [True] and len(caplog.records) == 1
+
+
+def test_what_a_hand_takes_anew_it_keeps_at_its_new_width(tmp_path, caplog):
+    """A cube of 7 cm in place of one of 3 cm: the fingers are further apart than with the first, and hold it."""
+    world = nuno.World(device="cpu")
+    robot = lifter_in(tmp_path, world)
+    hand, held = robot.hands["right_hand"], []
+    for edge in (0.03, 0.07):
+        cube, kept = cube_in(world, edge=edge)
+        assert robot.start_grasp("rarm") == [True]
+        kept.release()
+        world.run(0.1)
+        held.append(hand.width)
+        assert hand.held == (cube,)
+        if edge == 0.03:
+            saved = world.save()
+            robot.stop_grasp("rarm")
+            world.remove(cube)
+    assert held == pytest.approx([0.03, 0.07], abs=1e-6) and not caplog.records
+    world.restore(saved)
+    robot.angle_vector({"turn": 0.0}, 0.5)
+    robot.wait_interpolation()
+    assert hand.held == () and "from 0.030 m" in caplog.text
 
 
 @pytest.mark.long

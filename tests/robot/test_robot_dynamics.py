@@ -3,6 +3,7 @@
 import numpy as np
 import pinocchio as pin
 import pytest
+from lifter import lifter_in
 
 import nuno
 from nuno.errors import BodyStateError, InvalidInputError
@@ -228,6 +229,54 @@ def test_a_hand_stops_at_a_table(standing):
     top = float(table.vertices[:, 2].max())
     assert hand.vertices[:, 2].min() > top - 5e-3
     assert robot.state().fallen is None
+
+
+def test_a_joint_that_is_torn_apart_is_told_once(tmp_path, caplog):
+    """A finger bears 1e4 N across its slide; 1.1e4 N for a frame tear 0.05 kg off, which a warning tells by name."""
+    robot = lifter_in(tmp_path, nuno.World(device="cpu"), dynamics=True)
+    robot.sleep(0.05)
+    finger = robot.links.bodies[robot.links.names.index("a")]
+    robot.world.push(finger, (9e3, 0.0, 0.0), duration=1 / 60)
+    robot.sleep(1 / 60)
+    assert not caplog.records
+    robot.world.push(finger, (1.1e4, 0.0, 0.0), duration=1 / 60)
+    robot.sleep(3 / 60)
+    (record,) = [own for own in caplog.records if "torn" in own.getMessage()]
+    assert "'lifter/a'" in record.getMessage() and "set_up()" in record.getMessage()
+    apart = float(record.args[4])
+    # Euler's steps go further by one in as many as a frame has, and the force ends within one
+    assert apart == pytest.approx(0.5 * (1e3 / 0.05) / 60**2, rel=0.15)
+    robot.set_up()
+    robot.sleep(3 / 60)
+    assert len([own for own in caplog.records if "torn" in own.getMessage()]) == 1
+    assert robot.balance.dynamics.gaps().max() < 1e-6  # [m], floats
+
+
+@pytest.mark.parametrize("link", ["palm", "a"])
+def test_a_link_that_was_detached_by_itself_is_named_with_its_cure(tmp_path, link):
+    """Frames are refused, and both cures that the error names join the links anew: the joints bear them again."""
+    world = nuno.World(device="cpu")
+    robot = lifter_in(tmp_path, world, dynamics=True)
+    body = robot.links.bodies[robot.links.names.index(link)]
+    for cure in (robot.set_up, lambda: (robot.detach(), robot.attach())):
+        world.detach(body)
+        with pytest.raises(BodyStateError, match=r"was released.*robot.set_up\(\)"):
+            robot.sleep(1 / 60)
+        cure()
+        robot.sleep(2 / 60)
+        assert body.is_dynamic and robot.balance.dynamics.gaps().max() < 1e-6  # [m], floats
+    world.remove(body)
+    with pytest.raises(BodyStateError, match=f"add 'lifter/{link}' to the world"):
+        robot.sleep(1 / 60)
+    world.add(body)
+    robot.set_up()
+    robot.sleep(2 / 60)
+    assert robot.balance.dynamics.gaps().max() < 1e-6
+    world.remove(body)
+    robot.detach()
+    assert not robot.is_dynamic
+    robot.leave()
+    assert not world.bodies and not world.drivers
 
 
 def test_bad_calls_are_named():

@@ -296,7 +296,9 @@ def test_bad_images_are_named_and_change_nothing():
     world, towel = room()
     follower = nuno.follow(world, towel, CAMERA)
     mask, depth = look(world, towel)
+    negative = np.where(mask > 0, -depth, depth)
     bad = [(np.zeros((3, 4), bool),), (mask, depth[:5]), (mask, 1000.0 * depth), (mask, None, depth[:4]),
+           (mask, negative), (None, -depth),
            (np.zeros((90, 120, 3)),), ("mask",), (mask, "depth")]  # fmt: skip
     for parts in bad:
         with pytest.raises(nuno.ImageError):

@@ -144,6 +144,31 @@ def test_children_of_static_and_of_dynamic_bodies_move_the_colliders():
         world.attach(child)
 
 
+def test_bodies_that_follow_a_removed_one_stand_still():
+    """They are where they were to a double's rounding, whatever becomes of it; what is no body of the world follows."""
+    world = nuno.World(device="cpu")
+    table = world.add(nuno.box((1, 1, 0.1), name="table", position=(0.2, 0.3, 0.4)).rotate(0.5, "z"))
+    cup, spoon = (world.add(nuno.cylinder(0.04, 0.1, position=(x, 0, 0.5))) for x in (0.0, 0.1))
+    frame, loose = nuno.Coordinates((0, 0, 1)), nuno.cylinder(0.04, 0.1, position=(0.2, 0, 0.5))
+    table.assoc(cup)
+    table.assoc(frame)
+    frame.assoc(spoon)
+    table.assoc(loose)
+    poses = [np.concatenate(body.pose()) for body in (cup, spoon)]
+    saved = world.save()
+    world.remove(table)
+    table.locate((5.0, 0.0, 0.0)).rotate(1.0, "x")
+    world.run(0.1)
+    for body, pose in zip((cup, spoon), poses, strict=True):
+        assert body.parent is None
+        np.testing.assert_allclose(np.concatenate(body.pose()), pose, atol=1e-15)
+    assert frame.parent is table and loose.parent is table
+    assert np.linalg.norm(frame.position - table.position) < 2.0 and loose.position[0] > 4.0
+    world.restore(saved)
+    assert cup.parent is table
+    np.testing.assert_allclose(np.concatenate(cup.pose()), poses[0], atol=1e-15)
+
+
 def test_groups_and_ignored_pairs_filter_the_colliders():
     """Both masks must agree, and ignored pairs never touch."""
     world, towel = room()

@@ -135,6 +135,8 @@ def _gains(first: np.ndarray, second: np.ndarray, use: np.ndarray) -> tuple[np.n
         return np.ones(3, dtype=np.float32), 3.0
     ratio = b / a
     gains = np.median(ratio, axis=0)
+    if not (gains > 0.0).all():  # a channel that is black in the second image: nothing tells its light
+        return np.ones(3, dtype=np.float32), 3.0
     for _ in range(3):
         same = (np.abs(ratio / gains - 1.0) < 0.1).all(axis=-1)
         if same.sum() < 100:

@@ -14,6 +14,7 @@ from nuno.bodies.garment import LAYER_NAMES
 from nuno.errors import EstimationError
 from nuno.estimate.hold_views import HoldView, hold_masks
 from nuno.estimate.imagined_holds import Holds
+from nuno.estimate.ranking import ONLY_ONE
 from nuno.estimate.rotations import turn
 from nuno.files.whole_file import made_folder, write_figure, write_whole
 from nuno.validation import checked, count, flag
@@ -155,6 +156,8 @@ class HoldResult:
                 f"even the best imagined garment overlaps with what is seen by {self.overlap:.0%} only: is it this "
                 "garment, in this size, and does it hang free?"
             )
+        if len(self.holds.candidates) == 1:
+            found.append(ONLY_ONE)
         if self.confidence_up_to_symmetry < LOW_CONFIDENCE:
             others = ", ".join(
                 "({:.2f}, {:.2f}) m {} with {:.0f} %".format(

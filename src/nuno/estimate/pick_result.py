@@ -13,7 +13,7 @@ import numpy as np
 from nuno.camera.camera import Camera
 from nuno.camera.cloth_outline import ClothOutline
 from nuno.camera.rectangle import ClothRectangle
-from nuno.estimate.ranking import confidence, probabilities, tempered
+from nuno.estimate.ranking import ONLY_ONE, confidence, probabilities, tempered
 from nuno.estimate.rotations import turn
 from nuno.estimate.similarity import Silhouette
 from nuno.files.html_table import html_table
@@ -147,6 +147,8 @@ class PickResult:
     def warnings(self) -> list[str]:
         """Return what a reader of the answer should know, in plain words."""
         found = [*self.rectangle.warnings, *self.seen_warnings]
+        if len(self.labels) == 1:
+            found.append(ONLY_ONE)
         if self.confidence < LOW_CONFIDENCE:
             found.append(self._doubt())
         return found

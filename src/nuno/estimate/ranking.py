@@ -273,6 +273,10 @@ def tempered(scores: np.ndarray, trusted: float) -> np.ndarray:
     return at(high)
 
 
+ONLY_ONE = "only one candidate was given: its probability of 1 says nothing of how sure it is; give two or more"
+"""Warning of answers that had no rival."""
+
+
 def confidence(name: str, scores: np.ndarray) -> float:
     """Return how far the best candidate may be trusted, from 0 to 1.
 

@@ -59,7 +59,7 @@ class FingerDynamics:
         joints: Their sliders while attached.
         limits: The most that the fingers of each hand can press with [N], by its name.
         closed: Whether each hand was told to close: it presses on what stops it until it is told to open, or its joint
-            is wanted clearly more open than it is; vectors of all joints' angles do not loosen it.
+            is wanted clearly more open than it is; a vector of all joints' angles as they are does not loosen it.
         forces: The most that the fingers of each hand press with now [N]; the limits at first.
     """
 

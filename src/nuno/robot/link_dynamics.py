@@ -85,6 +85,7 @@ class LinkDynamics:
         self.joint_damping = np.array(model.damping[6:])
         self._is_free = bool(self.robot.description.feet)
         self._frames: tuple[Any, Any] | None = None  # joints, and what `_joint_frames` found of them
+        self._placed: tuple[np.ndarray, np.ndarray] | None = None  # where the links were when they were read last
         self.fingers = FingerDynamics(links, self.efforts)
 
     @property
@@ -191,6 +192,7 @@ class LinkDynamics:
                 np.concatenate(pair, axis=1)
                 for pair in zip((*still, nothing, nothing), (places, turns, velocities, spins), strict=True)
             )
+        self._placed = places, turns
         angles, rates = self._along(places, turns, velocities, spins)
         v = np.zeros((worlds, robot.model.nv))
         back = quat.inverse(turns[:, 0])
@@ -215,16 +217,36 @@ class LinkDynamics:
         )  # fmt: skip
         return positions_of(slides, frame, its), velocities_of(slides, speed, spin, its)
 
-    def _joint_frames(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[np.ndarray]]:
-        """Return each joint's bodies, whether it slides, and its frames in both, which stay as long as it is there."""
+    def gaps(self) -> np.ndarray:
+        """Return how far apart joints are across their ways, when they were read last (worlds, n + fingers) [m]."""
+        assert self._placed is not None
+        places, turns = self._placed
+        own, other, slides, (place, _, other_place, other_turn) = self._joint_frames(fingers=True)
+        shift = places[:, own] + quat.rotate(turns[:, own], place)
+        shift -= places[:, other] + quat.rotate(turns[:, other], other_place)
+        along = quat.rotate(quat.multiply(turns[:, other], other_turn), np.array([0.0, 0.0, 1.0]))
+        slid = np.where(slides, np.einsum("wjx,wjx->wj", shift, along), 0.0)
+        return np.asarray(np.linalg.norm(shift - slid[..., None] * along, axis=-1))
+
+    def _joint_frames(self, fingers: bool = False) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[np.ndarray]]:
+        """Return each joint's bodies, whether it slides, and its frames in both, which stay as long as it is there.
+
+        Args:
+            fingers: Whether the slides of fingers follow.
+        """
         if self._frames is None or self._frames[0] is not self.joints:
             parents = [int(self.robot.model.parents[j]) - 1 for j in range(2, self.robot.model.njoints)]
-            specs = [joint.spec for joint in self.joints]
-            names = ("place", "turn", "other_place", "other_turn")
-            frames = [np.stack([getattr(spec, name) for spec in specs], axis=1) for name in names]
-            slides = np.array([spec.kind == "slider" for spec in specs])
-            self._frames = self.joints, (np.arange(1, len(specs) + 1), np.array(parents, dtype=int), slides, frames)
-        return self._frames[1]
+            own, sliding = list(range(1, len(self.joints) + 1)), self.fingers
+            carriers = [finger.joint - 1 for finger in sliding.fingers]
+            self._frames = self.joints, (
+                _frames_of(self.joints, own, parents),
+                _frames_of(
+                    (*self.joints, *sliding.joints), [*own, *(self.bodies.index(b) for b in sliding.bodies)],
+                    [*parents, *carriers],
+                ),
+            )  # fmt: skip
+        found: tuple[np.ndarray, np.ndarray, np.ndarray, list[np.ndarray]] = self._frames[1][fingers]
+        return found
 
     def felt(self, span: float) -> tuple[list[Contacts], np.ndarray, np.ndarray]:
         """Return what touched links, what joints bore, and what their motors did over the last frame.
@@ -331,6 +353,17 @@ class LinkDynamics:
         """Become what it was when a snapshot was taken."""
         self.joints, self.fingers.joints, forces, closed = saved
         self.fingers.forces, self.fingers.closed = dict(forces), dict(closed)
+
+
+def _frames_of(
+    joints: Sequence[Joint], own: list[int], other: list[int]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[np.ndarray]]:
+    """Return which bodies joints are of, whether they slide, and their frames (worlds, k, 3 or 4) in both bodies."""
+    specs = [joint.spec for joint in joints]
+    names = ("place", "turn", "other_place", "other_turn")
+    frames = [np.stack([getattr(spec, name) for spec in specs], axis=1) for name in names]
+    slides = np.array([spec.kind == "slider" for spec in specs])
+    return np.array(own, dtype=int), np.array(other, dtype=int), slides, frames
 
 
 def _grips_of(bodies: Iterable[Body]) -> list[Grip]:

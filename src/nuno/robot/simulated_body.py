@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,9 +22,18 @@ if TYPE_CHECKING:
     from nuno.robot.humanoid import Humanoid
     from nuno.robot.links import Links
     from nuno.robot.motion_guard import MotionGuard
+    from nuno.robot.robot_state import RobotState
+    from nuno.robot.servo import Servo
     from nuno.robot.simulated_gripper import SimulatedGripper
     from nuno.robot.simulated_joints import SimulatedJoints
     from nuno.robot.wanted_motion import WantedMotion
+
+logger = logging.getLogger(__name__)
+
+TORN = 0.05
+"""[m] From how far apart on a joint counts as torn; loads leave micrometres, and a millimetre for a moment."""
+WHOLE = 0.01
+"""[m] Below it, all joints count as whole again."""
 
 
 class SimulatedBody(SimulatedSenses):
@@ -50,6 +60,8 @@ class SimulatedBody(SimulatedSenses):
     guard: MotionGuard
     _burden: Burden
     _entered: bool
+    _servo: Servo | None
+    _is_torn = False  # and that was told
 
     @property
     def is_dynamic(self) -> bool:
@@ -131,6 +143,9 @@ class SimulatedBody(SimulatedSenses):
     def detach(self) -> None:
         """Take the dynamics away: the robot stands still in its posture, and goes exactly where it is sent from now on.
 
+        The links are where the joints say, also fingers, of which one had slid further than another: they jump by half
+        of what they differ.
+
         Raises:
             BodyStateError: it has none.
         """
@@ -139,6 +154,8 @@ class SimulatedBody(SimulatedSenses):
                 raise BodyStateError(f"{self.actual.name!r} has no dynamics")
             pressed = {name: hand.held for name, hand in self.hands.items() if hand.presses}
             self.balance.dynamics.detach()
+            if not self.links.missing:
+                self.links.follow(0.0)  # fingers slid apart, each as far as its own forces had it
             for name, bodies in pressed.items():  # what fingers pressed on is gripped from now on
                 self.hands[name].close([body for body in bodies if body.is_dynamic])
             self._set_tolerance()
@@ -162,6 +179,50 @@ class SimulatedBody(SimulatedSenses):
             self._start_from(self.actual.configuration())
             if was_dynamic:
                 self.attach()
+
+    def _drive(self, aim: RobotState, span: float) -> None:
+        """Set the motors for a frame of ``span`` [s] at whose end the robot is wanted at ``aim``.
+
+        Raises:
+            BodyStateError: somebody took dynamics from a link alone, or the link from the world.
+        """
+        assert self.balance is not None
+        try:
+            self.balance.dynamics.drive(*self.balance.command([self._state], [aim], span, self._servo))
+            self.balance.dynamics.lead_fingers(self.actual.angles_of(aim.q))
+        except BodyStateError as error:
+            first = f"add {self.links.missing[0]!r} to the world again, then " if self.links.missing else ""
+            raise BodyStateError(
+                f"{error}, as its link was detached or removed by itself, and {self.actual.name!r} cannot move without "
+                f"it: {first}robot.set_up(), or robot.detach() and robot.attach(), join its links anew; restoring a "
+                "snapshot does so, too"
+            ) from error
+
+    def _tell_torn(self) -> None:
+        """Warn, once until they are whole again, where forces have torn joints of a robot with dynamics apart."""
+        assert self.balance is not None
+        dynamics = self.balance.dynamics
+        gaps = dynamics.gaps()[0]
+        farthest = float(gaps.max(initial=0.0))
+        if farthest < (WHOLE if self._is_torn else TORN):
+            self._is_torn = False
+            return
+        if self._is_torn:
+            return
+        self._is_torn = True
+        worst, torn = int(gaps.argmax()), int((gaps > TORN).sum())
+        joint = (*dynamics.joints, *dynamics.fingers.joints)[worst]
+        names = self.actual.joint_names
+        name = repr(names[worst]) if worst < len(names) else f"the slide of {joint.body.name!r}"
+        others = f" and {torn - 1} more are more than {100.0 * TORN:g} cm" if torn > 1 else " is"
+        pressed = sorted({other for own in self._state.contacts.values() for other in own})
+        logger.warning(
+            "%r is torn at t = %.3f s: %s%s apart, by %.3g m at most: greater forces pulled at its links than joints "
+            "bear, mostly as something stands inside a link (it touches %s). What it does from here on is not to be "
+            "believed. Move what overlaps its links away, or let their contact be ignored (world.ignore_contact), and "
+            "call robot.set_up(), or restore a snapshot",
+            self.actual.name, self.world.time, name, others, farthest, ", ".join(pressed) or "nothing",
+        )  # fmt: skip
 
     def _set_tolerance(self) -> None:
         """Let goals without tolerances end with their time where motors move the joints, as on robots with motors."""

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import logging
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nuno.robot.finger_dynamics import OPENS
 from nuno.robot.goal import Goal, GoalStatus, ResultCode
 from nuno.robot.hands import Hand, pressed_by
 from nuno.robot.simulated_joints import SimulatedJoints
 from nuno.robot.trajectory import JointTrajectory
 
 if TYPE_CHECKING:
+    from nuno.joints.grip import Grip
     from nuno.robot.finger_dynamics import FingerDynamics
     from nuno.robot.robot_state import Contacts
+
+logger = logging.getLogger(__name__)
 
 PEAK = 1.5
 """Of the mean, the highest velocity on a cubic between two points of rest."""
@@ -23,6 +28,8 @@ PATIENCE = 120
 """and frames after which they count as resting all the same."""
 NEAR = 2e-3
 """[m] How far from where they were to go fingers are that something stopped."""
+LOOSE = 2.0 * OPENS
+"""[m] By how much further apart than they hold something fingers are wanted that are to let go of it."""
 
 
 class SimulatedGripper:
@@ -30,7 +37,8 @@ class SimulatedGripper:
 
     The fingers move at up to their greatest velocity; what is between them when they are to close is held from
     when they have, and let go when they begin to open. A hand without joints does either at the end of the next frame.
-    A hand that presses holds by friction what stops its fingers.
+    A hand that presses holds by friction what stops its fingers. Where a vector of joint angles opens fingers that hold
+    something, they let go of it, and a warning says so.
 
     Args:
         hand: The hand.
@@ -48,6 +56,7 @@ class SimulatedGripper:
         self._motion: Goal | None = None
         self._closes, self._width = False, hand.description.width
         self._aim, self._last, self._waited = hand.description.width, hand.description.width, 0
+        self._hold: tuple[tuple[Grip, ...], float] = ((), 0.0)  # grips, and how far apart the fingers were with them
         joint = hand.description.joint
         self._controller = next((name for name, own in joints.controllers.items() if joint in own.names), None)
 
@@ -88,6 +97,7 @@ class SimulatedGripper:
         """
         if self._fingers is not None:
             self.hand.pressed = pressed_by(self.hand, contacts)
+        self._let_go_where_opened()
         goal = self.goal
         if goal is None or goal.is_done or (self._motion is not None and not self._motion.is_done):
             return
@@ -113,16 +123,54 @@ class SimulatedGripper:
     def save(self) -> tuple[Any, ...]:
         """Return all that it is, for ``load``."""
         status = None if self.goal is None else (self.goal.status, self.goal.text)
-        motion = self._motion, self._closes, self._width, self._aim, self._last, self._waited, self.effort
+        motion = (
+            self._motion, self._closes, self._width, self._aim, self._last, self._waited, self.effort, self._hold
+        )  # fmt: skip
         return self.goal, status, motion, self.hand.grips, self.hand.pressed
 
     def load(self, saved: tuple[Any, ...]) -> None:
         """Become what it was."""
         self.goal, status, motion, grips, self.hand.pressed = saved
-        self._motion, self._closes, self._width, self._aim, self._last, self._waited, self.effort = motion
+        self._motion, self._closes, self._width, self._aim, self._last, self._waited, self.effort = motion[:7]
+        self._hold = motion[7]
         if self.goal is not None:
             self.goal.status, self.goal.text = status
         self.hand._grips = list(grips)
+
+    def _let_go_where_opened(self) -> None:
+        """Let go of what is held where a vector of joint angles, and no gripper's goal, opens the fingers."""
+        hand, fingers = self.hand, self._fingers
+        joint = hand.description.joint
+        presses = hand.presses and fingers is not None and fingers.closed[hand.name]
+        held, grips = (hand.held, ()) if presses else ((), hand.grips)
+        if joint is None or not (held or grips):
+            return
+        if self._motion is not None and not self._motion.is_done:
+            return  # a gripper's goal moves the fingers
+        if presses:
+            wanted, width = self._wanted_width(joint), hand.width
+        else:
+            wanted = hand.width
+            if grips != self._hold[0]:
+                self._hold = grips, wanted
+            width, held = self._hold[1], tuple(grip.body for grip in grips)
+        if wanted <= width + LOOSE:
+            return
+        names = " and ".join(sorted({body.name for body in held}))
+        logger.warning(
+            "the %s of %r lets go of %s: %r was sent along and opens the fingers from %.3f m; send vectors in which "
+            "that joint stays as it is (update_robot_state() and angle_vector() tell), or to one group of joints: "
+            "angle_vector(angles, seconds, controller_type)", hand.name, hand.links.robot.name, names, joint, width,
+        )  # fmt: skip
+        if presses and fingers is not None:
+            fingers.closed[hand.name] = False
+        hand.open()
+
+    def _wanted_width(self, joint: str) -> float:
+        """Return how far apart the fingers are wanted [m]."""
+        own = self.hand.description
+        angle = self._joints.desired[0][self.hand.links.robot.joint_index(joint)]
+        return float(own.width * np.clip((angle - own.closed) / (own.open - own.closed), 0.0, 1.0))
 
     def _is_moving(self) -> bool:
         """Return True as long as the fingers move, up to a while."""

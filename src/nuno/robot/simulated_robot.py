@@ -17,6 +17,7 @@ from nuno.robot.humanoid import Humanoid
 from nuno.robot.joint_interface import Controller
 from nuno.robot.loads import LinkLoads
 from nuno.robot.motion_guard import MotionGuard
+from nuno.robot.overlapping_robots import warn_of_overlaps
 from nuno.robot.readings import JointState
 from nuno.robot.robot_state import RobotState
 from nuno.robot.sensor_model import SensorModel
@@ -113,6 +114,7 @@ class SimulatedRobot(SimulatedBody):
         self._before: RobotState | None = None  # its state when the frame began
         self._due = wall_clock.perf_counter()
         self._state = self._motion.aim
+        warn_of_overlaps(self.links, [own.links for own in world.drivers if isinstance(own, SimulatedRobot)])
         if dynamics:
             self.attach()
         with world.lock:
@@ -310,9 +312,8 @@ class SimulatedRobot(SimulatedBody):
             self._motion.cancel()
             self.servo(None)
             aim = self._motion.begin(end, span)
-        if self.balance is not None and self.is_dynamic:
-            self.balance.dynamics.drive(*self.balance.command([self._state], [aim], span, self._servo))
-            self.balance.dynamics.lead_fingers(self.actual.angles_of(aim.q))
+        if self.is_dynamic:
+            self._drive(aim, span)
             return
         self._state = aim
         if aim.q is not before.q and np.count_nonzero(aim.q != before.q):
@@ -327,6 +328,7 @@ class SimulatedRobot(SimulatedBody):
             ended = self.balance.ended(max(self.world.time - self._state.time, 1e-9))
             self._state = self.balance.judge([self._state], [self._motion.aim], ended, self.world.time)[0]
             self._motion.take_footing(self._state)
+            self._tell_torn()
             angles = self.actual.angles_of(self._state.q)
             self.actual.move_to(angles, self._state.q[:7])
             actual = (angles, self._state.v[6:], self._state.a[6:])

@@ -135,7 +135,10 @@ def _whole(material: Rigid, shape: Shape, thickness: float, offset: np.ndarray) 
     friction, restitution, air_drag = (
         float(np.ravel(value)[0]) for value in (material.friction, material.restitution, material.air_drag)
     )
-    return Rigid(density, mass, inertia, friction, restitution, air_drag, centre)
+    return Rigid(
+        mass=mass, inertia=inertia, friction=friction, restitution=restitution, air_drag=air_drag,
+        centre_of_mass=centre,
+    )  # fmt: skip
 
 
 def _add_grip(

@@ -78,7 +78,7 @@ def observe(grid: PixelGrid, mask: Any, depth: Any, hidden: Any) -> Observation:
 
 
 def check_depth(depth: Any, camera: Camera) -> np.ndarray:
-    """Return depths (height, width) as they are, of the camera's size.
+    """Return depths (height, width) as they are, of the camera's size and nowhere negative.
 
     Raises:
         ImageError: they are not.
@@ -88,6 +88,12 @@ def check_depth(depth: Any, camera: Camera) -> np.ndarray:
         raise ImageError(
             f"depth must be numbers [m] of shape {(camera.height, camera.width)} to fit its camera, got "
             f"{given.dtype} of shape {given.shape}"
+        )
+    behind = (given < 0) & np.isfinite(given)
+    if behind.any():
+        raise ImageError(
+            f"depth is negative in {int(behind.sum())} pixels, {float(given[behind].min()):.3g} m at least: it goes "
+            "from the camera along its axis, and what is not known is 0, NaN or infinite"
         )
     return given
 

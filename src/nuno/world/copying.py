@@ -187,7 +187,8 @@ class Copying(Running):
             BodyStateError: there is none, or there are several: see ``drivers``.
         """
         if len(self.drivers) != 1:
-            raise BodyStateError(f"a world with one robot is needed, this one has {len(self.drivers)} drivers")
+            more = ": drivers[k] are they, in the order in which they came" if self.drivers else ""
+            raise BodyStateError(f"a world with one robot is needed, this one has {len(self.drivers)} drivers{more}")
         return self.drivers[0]
 
     def _tell_of(self, driver: Driver) -> None:

@@ -20,6 +20,7 @@ from nuno.joints.joint import Joint
 from nuno.joints.make_grip import make_grip, warn_shared
 from nuno.joints.tie import check_leader, check_weld, tie_to_leader
 from nuno.materials import Material, Rigid
+from nuno.shapes.coordinates import Coordinates
 from nuno.shapes.path import Path
 from nuno.solvers.resolution_warnings import warn_of_resolution
 from nuno.tables.kinematic_motion import arrive, path_for
@@ -93,7 +94,11 @@ class World(Setting):
         return body
 
     def remove(self, body: Body | str) -> Body:
-        """Take a body out of the world, detached in the shape that it has now, and return it."""
+        """Take a body out of the world, detached in the shape that it has now, and return it.
+
+        Grips that it leads end. Bodies of the world that follow it (``assoc``) stand still from now on where they are;
+        to let them go along with it where it stands again, ``assoc`` them anew.
+        """
         with self._change("remove"):
             removed = self._own(body)
             if removed.is_dynamic:
@@ -101,6 +106,8 @@ class World(Setting):
             for other in self._attached():
                 for grip in [g for g in other.grips if g.target is removed]:
                     self._drop_grip(grip)
+            if removed.children:
+                _leave_standing(removed, set(self.bodies))
             del self._bodies[removed.key]
             removed._world = removed._path = None
             self._colliders_changed()
@@ -375,3 +382,12 @@ class World(Setting):
                 self._engine.require("impulses")
             (self._rules.summed.add if on else self._rules.summed.discard)(own.key)
             self._engine.changed()
+
+
+def _leave_standing(frame: Coordinates, bodies: set[Body]) -> None:
+    """Let bodies of a world follow a frame no more, nor frames that follow it."""
+    for child in frame.children:
+        if isinstance(child, Body) and child in bodies:
+            frame.dissoc(child)
+        else:
+            _leave_standing(child, bodies)

@@ -268,7 +268,7 @@ def test_a_run_that_fails_leaves_the_world_as_it_was():
     """Velocities beyond all bounds end as SimulationDiverged, and the last good state is there again."""
     world, _, cloth = scene()
     world.run(0.05)
-    world.set_velocity(cloth, (0.0, 0.0, 1e200))
+    world.set_velocity(cloth, (0.0, 0.0, 1e38))
     before, time = cloth.vertices, world.time
     with pytest.raises(nuno.SimulationDiverged):
         world.run(0.2)
