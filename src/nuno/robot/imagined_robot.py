@@ -10,20 +10,22 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nuno.errors import BodyStateError, InvalidInputError
+from nuno.errors import BodyStateError, InvalidInputError, RobotModelError
+from nuno.robot.imagined_sensors import ImaginedReadings, ImaginedSensors
 from nuno.robot.link_batch import LinkBatch
 from nuno.robot.motion_batch import MotionBatch
 from nuno.robot.motion_guard import MotionGuard
-from nuno.robot.robot_state import RobotState
+from nuno.robot.robot_state import RobotState, RobotStates
 from nuno.robot.trajectory import JointTrajectory, passing_velocities
 from nuno.robot.wanted_motion import WantedMotion
-from nuno.validation import finite_array, number
+from nuno.validation import checked, finite_array, number
 
 if TYPE_CHECKING:
     from nuno.robot.balance import Balance
     from nuno.robot.humanoid import Humanoid
     from nuno.robot.links import Links
     from nuno.robot.reported_joints import Angles
+    from nuno.robot.sensors import Sensors
     from nuno.robot.simulated_joints import SimulatedJoints
     from nuno.world.world import World
 
@@ -37,6 +39,7 @@ class OriginalRobot(Protocol):
     joints: SimulatedJoints
     guard: MotionGuard
     balance: Balance | None
+    sensors: Sensors
     collisions: str
 
     @property
@@ -56,8 +59,8 @@ class OriginalRobot(Protocol):
 class ImaginedRobot:
     """A robot in every world of a batch: ``world.imagine(n).robot``.
 
-    What is under way in the robot's world goes on in each of them. Commands may differ from world to world. Sensors and
-    cameras are the original's alone.
+    What is under way in the robot's world goes on in each of them. Commands may differ from world to world. Sensors are
+    exact, whatever models the original's have; cameras are the original's alone.
 
     Args:
         original: The robot.
@@ -98,6 +101,9 @@ class ImaginedRobot:
             self._guards[k].load(found)
             own.gait.looks = self._guards[k].velocities_of(own)
         self._before = self._states
+        self._ground = original.sensors.ground
+        self._sensors: ImaginedSensors | None = None  # made when they are first read
+        self._read: ImaginedReadings | None = None
         self._batch = LinkBatch(original.links, world, self._links)
         self._together = MotionBatch(original.actual, self._motions, self._guards)
 
@@ -110,6 +116,43 @@ class ImaginedRobot:
         """Return where the robot is and how it moves, and whether it fell, of each world."""
         with self.world.lock:
             return tuple(self._states)
+
+    def state_arrays(self) -> RobotStates:
+        """Return what ``state`` tells as arrays over worlds."""
+        with self.world.lock:
+            return RobotStates.of(self._states, self.original.actual)
+
+    def read(self) -> ImaginedReadings:
+        """Return what all sensors tell in each world, read once a frame; they are exact.
+
+        As of the robot itself, without dynamics forces follow by inverse dynamics with what the bodies of each world do
+        to the links there; with dynamics from what the joints bore in the last frame.
+
+        Raises:
+            BodyStateError: a link was removed from the batch.
+        """
+        with self.world.lock:
+            if not self._is_whole():
+                raise BodyStateError(f"the copies of {self.original.actual.name!r} lack links; imagine the batch anew")
+            if self._read is None or self._read.time != self.world.time:
+                if self._sensors is None:
+                    own = self.original
+                    self._sensors = ImaginedSensors(own.actual, own.links, self.world, self._links, self._ground)
+                self._read = self._sensors.read_worlds(self._states, self.world.time)
+            return self._read
+
+    @checked
+    def read_wrench(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return forces [N] and torques [N m] of what lies beyond a sensor, (worlds, 3) each; see ``RobotInterface``.
+
+        Raises:
+            RobotModelError: the robot has no such sensor.
+            BodyStateError: a link was removed from the batch.
+        """
+        found = self.read().wrenches.get(frame)
+        if found is None:
+            raise RobotModelError(f"{self.original.actual.name!r} has no force sensor in {frame!r}")
+        return found[:, :3].copy(), found[:, 3:].copy()
 
     def angle_vector(
         self, angles: ArrayLike | Mapping[str, ArrayLike] | None = None, seconds: float = 1.0
@@ -252,7 +295,7 @@ class ImaginedRobot:
     def load(self, saved: Any) -> None:
         """Become what it was when a snapshot was taken."""
         states, motions, joints, self._servo, found = saved
-        self._states = list(states)
+        self._states, self._read = list(states), None
         self._together.forget()
         for own, motion in zip(self._motions, motions, strict=True):
             own.load(motion)
