@@ -555,6 +555,7 @@ UNCALLED = {
         "Links.poses_at",
         "SimulatedRobot.imagined",
         "SimulatedRobot.take_future",
+        "SimulatedRobot.future_commands",
         "Joint.spec_for",
         "Path.keys_around",
         "Walk.ensure",

@@ -16,6 +16,7 @@ from nuno.robot.link_batch import LinkBatch
 from nuno.robot.motion_batch import MotionBatch
 from nuno.robot.motion_guard import MotionGuard
 from nuno.robot.robot_state import RobotState, RobotStates
+from nuno.robot.simulated_joints import Sent
 from nuno.robot.trajectory import JointTrajectory, passing_velocities
 from nuno.robot.wanted_motion import WantedMotion
 from nuno.validation import checked, finite_array, number
@@ -79,6 +80,9 @@ class ImaginedRobot:
         self.original, self.world = original, world
         self.joint_names = original.actual.joint_names
         state, motion, self._servo, found = original.saved() if of is None else of[0].saved_of(of[1])
+        # what is under way as the robot itself is imagined, and what each copy was sent since
+        self._under_way: Any = motion if of is None else of[0]._under_way
+        self._sent: list[tuple[Sent, ...]] = [() if of is None else of[0]._sent[of[1]]] * world.world_count
         self._links = [world.find(body.name) for body in original.links.bodies]
         self.balance: Balance | None = None
         if original.balance is not None and (original.is_dynamic if of is None else of[0].balance is not None):
@@ -213,14 +217,16 @@ class ImaginedRobot:
             raise BodyStateError(f"{self.original.actual.name!r} walks or is under a servo command there")
         self._together.bring()
         shortest = self.original.angle_vector_duration
-        for own, begin, goals in zip(self._motions, self._present(), wanted, strict=True):
+        for k, (own, begin, goals) in enumerate(zip(self._motions, self._present(), wanted, strict=True)):
             steps = np.array([self.original.sub_angle_vector(b, a) for a, b in pairwise((begin, *goals))])
             needed = [shortest(a, b) for a, b in pairwise((begin, *goals))]
             longer = np.maximum(spans, needed)  # as the driver stretches what is too fast
             speeds, times = passing_velocities(steps, longer), np.cumsum(longer)
             for name, rows in own.joints.rows.items():
                 names = own.joints.controllers[name].names
-                own.joints.send(name, JointTrajectory(names, times, goals[:, rows], speeds[:, rows]))
+                trajectory = JointTrajectory(names, times, goals[:, rows], speeds[:, rows])
+                own.joints.send(name, trajectory)
+                self._sent[k] += (Sent(own.joints.clock, name, trajectory),)
 
     def _present(self) -> np.ndarray:
         """Return where the joints are (worlds, n), as encoders tell the driver, which plans from there."""
@@ -234,6 +240,10 @@ class ImaginedRobot:
         self._together.bring()
         found = self._guards[world].save() if self._guards else None
         return self._states[world], self._motions[world].save(), self._servo, found
+
+    def commanded_in(self, world: int) -> tuple[Any, Any, tuple[Sent, ...]]:
+        """Return what was under way as the robot was imagined, its servo command, and what a copy was sent since."""
+        return self._under_way, self._servo, self._sent[world]
 
     # What the world asks of it
 
@@ -290,12 +300,13 @@ class ImaginedRobot:
         joints = () if self.balance is None else self.balance.dynamics.save()
         found = [guard.save() for guard in self._guards]
         self._together.bring()
-        return list(self._states), [own.save() for own in self._motions], joints, self._servo, found
+        motions, sent = [own.save() for own in self._motions], list(self._sent)
+        return list(self._states), motions, joints, self._servo, found, sent
 
     def load(self, saved: Any) -> None:
         """Become what it was when a snapshot was taken."""
-        states, motions, joints, self._servo, found = saved
-        self._states, self._read = list(states), None
+        states, motions, joints, self._servo, found, sent = saved
+        self._states, self._read, self._sent = list(states), None, list(sent)
         self._together.forget()
         for own, motion in zip(self._motions, motions, strict=True):
             own.load(motion)
