@@ -4,18 +4,35 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from nuno.errors import BodyStateError
 
 if TYPE_CHECKING:
-    from nuno.robot.simulated_robot import SimulatedRobot
+    from nuno.robot.gait import Gait
+    from nuno.robot.humanoid import Humanoid
+    from nuno.robot.servo import ServoCommand
+    from nuno.robot.simulated_joints import SimulatedJoints
     from nuno.world.world import World
 
 logger = logging.getLogger(__name__)
 
 
-def future_commands(robot: SimulatedRobot, futures: World, k: int) -> Callable[[], None]:
+class CommandedRobot(Protocol):
+    """The robot that carries commands out; `SimulatedRobot` says what each member is."""
+
+    actual: Humanoid
+    joints: SimulatedJoints
+    gait: Gait
+
+    def saved(self) -> tuple[Any, Any, Any, Any]:
+        """Return its state, what is wanted of it, its servo command, and what was found of its way."""
+
+    def servo(self, command: ServoCommand | None) -> None:
+        """Put joints under a torque law, or give them back."""
+
+
+def future_commands(robot: CommandedRobot, futures: World, k: int) -> Callable[[], None]:
     """Return what lets a robot do from now on what its copy in a future was told to.
 
     Where the robot is as it was when it was imagined, its joints are wanted to the bit where the copy's were. Else what

@@ -345,10 +345,10 @@ def _queued(waiting: Sequence[Later], sent: Sequence[Later]) -> tuple[Later, ...
 
 def _rest_of(spline: Spline, time: float) -> JointTrajectory | None:
     """Return what is left of a trajectory at a time [s], None where it is over."""
-    own, gone = spline.trajectory, time - spline.start
-    left = own.times > gone + SOON
+    own, passed = spline.trajectory, time - spline.start
+    left = own.times > passed + SOON
     if not left.any():
         return None
     velocities = None if own.velocities is None else own.velocities[left]
     accelerations = None if own.accelerations is None else own.accelerations[left]
-    return JointTrajectory(own.names, own.times[left] - gone, own.positions[left], velocities, accelerations)
+    return JointTrajectory(own.names, own.times[left] - passed, own.positions[left], velocities, accelerations)
