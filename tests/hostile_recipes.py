@@ -390,7 +390,7 @@ CALLS = {
     "SweepResult.best": {"name": "y"}, "SweepResult.row": {"index": 0}, "SweepResult.values": {"name": "y"},
     "SweepResult.save_csv": {"path": "out.csv"},
     "SurfacePoints.positions": {"vertices": TRIANGLES[0], "faces": TRIANGLES[1]},
-    "World.add": {"body": lambda s: nuno.box((1, 1, 1))}, "World.adopt": {"futures": lambda s: s.futures, "k": 0},
+    "World.add": {"body": lambda s: nuno.box((1, 1, 1))}, "World.adopt": {"futures": lambda s: s.futures, "k": 0, "only": None},
     "World.attach": {"body": "still"}, "World.contact_force": {"body": "towel"}, "World.contacts": {"body": "towel"},
     "World.depth": {"camera": lambda s: s.camera}, "World.detach": {"body": "towel"}, "World.find": {"name": "towel"},
     "World.grip": {"body": "towel", "where": [1], "to": POINT, "compliance": 1e-3},
