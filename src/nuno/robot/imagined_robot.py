@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -27,8 +28,12 @@ if TYPE_CHECKING:
     from nuno.robot.links import Links
     from nuno.robot.reported_joints import Angles
     from nuno.robot.sensors import Sensors
+    from nuno.robot.simulated_gripper import SimulatedGripper
     from nuno.robot.simulated_joints import SimulatedJoints
     from nuno.world.world import World
+
+
+logger = logging.getLogger(__name__)
 
 
 class OriginalRobot(Protocol):
@@ -41,6 +46,7 @@ class OriginalRobot(Protocol):
     guard: MotionGuard
     balance: Balance | None
     sensors: Sensors
+    grippers: dict[str, SimulatedGripper]
     collisions: str
 
     @property
@@ -104,6 +110,11 @@ class ImaginedRobot:
             self._guards.append(MotionGuard(original.links, original.collisions, world, above, k))
             self._guards[k].load(found)
             own.gait.looks = self._guards[k].velocities_of(own)
+        if closing := [name for name, own in original.grippers.items() if of is None and own.will_hold]:
+            logger.warning(
+                "%s of %r closes: its copies' fingers go on, but grip nothing there; imagine when it holds",
+                " and ".join(closing), original.actual.name,
+            )  # fmt: skip
         self._before = self._states
         self._ground = original.sensors.ground
         self._sensors: ImaginedSensors | None = None  # made when they are first read
