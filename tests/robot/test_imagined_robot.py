@@ -136,6 +136,16 @@ def test_a_batch_goes_back_with_its_robots(scene):
     assert all(np.array_equal(once[1], state.q) for state in again.robot.state())
 
 
+def test_a_hand_that_closes_is_told(scene, caplog):
+    """Without dynamics copies' fingers grip nothing when they have closed; with dynamics they press as the robot's."""
+    world, robot, _, saved = scene
+    world.restore(saved)
+    robot.start_grasp("larm", wait=False)
+    world.step()
+    world.imagine(1)
+    assert ("left_hand of 'talos' closes" in caplog.text) != robot.is_dynamic
+
+
 def test_bad_commands_are_named(scene):
     """Another number of joints or worlds, and a world without a robot."""
     world, _, _, saved = scene

@@ -136,6 +136,12 @@ def check(seed, folder, dynamics):
     futures.run(0.05)
     ends[1] = state_of(futures, futures.robot.state()[1], 1)
     wrong += [f"adopted, later: {name}" for name in differing(state_of(world, robot.state()), ends[1])]
+
+    # commands alone: the robot does from the same moment what its copy did
+    world.restore(saved)
+    world.adopt(futures, 0, only="commands")
+    world.run(AHEAD)
+    wrong += [f"commanded: {name}" for name in differing(state_of(world, robot.state()), ends[0])]
     return [f"seed {seed} after {', '.join(log)}: {each}" for each in wrong]
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from nuno.robot.goal import GoalStatus, ResultCode, Tolerances
 from nuno.robot.trajectory import JointTrajectory
-from nuno.robot.trajectory_controller import TrajectoryController
+from nuno.robot.trajectory_controller import Later, TrajectoryController
 
 ROWS = np.array([0, 1])
 STEP = 0.01
@@ -187,3 +187,44 @@ def test_saved_and_loaded():
     assert goal.status == GoalStatus.ACTIVE and later.status == GoalStatus.PREEMPTED
     np.testing.assert_array_equal(run(own, 0.3, 1.0)[0], end[0])
     assert goal.status == GoalStatus.SUCCEEDED
+
+
+def test_what_is_to_come_is_followed_as_if_it_were_sent_then():
+    """Two trajectories sent at 0.2 and 0.5 s, and a controller that is told of both before: equal, also looked ahead.
+
+    Another one that is 1 s later goes the same way from the same rest.
+    """
+    first = JointTrajectory(("a", "b"), [0.3, 0.6], [[0.3, -0.1], [0.5, 0.2]], np.zeros((2, 2)))
+    ways = [
+        JointTrajectory(("a", "b"), [0.2, 0.5], [[0.1, 0.4], [-0.2, 0.3]], np.zeros((2, 2))),
+        JointTrajectory(("b", "a"), [0.4], [[0.0, 1.0]]),
+    ]
+    sent = [Later(0.2, ways[0]), Later(0.5, ways[1].of(("a", "b")))]
+    told, own, later = (TrajectoryController(("a", "b"), np.zeros(2)) for _ in range(3))
+    told.accept(first, 0.0)
+    saved = told.save()
+    own.accept(first, 0.0)
+    own.go_on(saved, sent)
+    later.begin_anew(saved, sent, 0.0, 1.0, np.zeros(2))
+    times = np.arange(1, 13) * 0.1
+    ahead, goals = own.ahead(np.array([0.0, *times])), []
+    for k, time in enumerate(times.tolist()):
+        for each, step in ((told, time), (own, time), (later, 1.0 + time)):
+            each.advance(step)
+        np.testing.assert_array_equal(own.piece.at(time)[0], told.piece.at(time)[0])
+        np.testing.assert_allclose(later.piece.at(1.0 + time)[0], told.piece.at(time)[0], atol=1e-12)
+        np.testing.assert_allclose(ahead[k + 1], told.piece.at(time)[0], atol=1e-12)  # rounds in another order
+        assert own.is_busy
+        goals.append(own.goal)
+        for each in (own, told):
+            each.check(time, *[each.piece.at(time)] * 2, np.arange(2))
+        for way in sent:
+            if abs(time - way.start) < 1e-9:
+                told.accept(way.trajectory, time)
+        if time >= 0.9:
+            break
+    assert own.goal.succeeded and told.goal.succeeded and not own.is_busy
+    assert [goal.status for goal in dict.fromkeys(goals)][:2] == [GoalStatus.PREEMPTED] * 2
+    own.go_on(saved, sent)
+    own.cancel(np.zeros(2))
+    assert not own.is_busy and own.end == -np.inf

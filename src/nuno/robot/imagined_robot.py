@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -10,22 +11,29 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nuno.errors import BodyStateError, InvalidInputError
+from nuno.errors import BodyStateError, InvalidInputError, RobotModelError
+from nuno.robot.imagined_sensors import ImaginedReadings, ImaginedSensors
 from nuno.robot.link_batch import LinkBatch
 from nuno.robot.motion_batch import MotionBatch
 from nuno.robot.motion_guard import MotionGuard
-from nuno.robot.robot_state import RobotState
+from nuno.robot.robot_state import RobotState, RobotStates
+from nuno.robot.simulated_joints import Sent
 from nuno.robot.trajectory import JointTrajectory, passing_velocities
 from nuno.robot.wanted_motion import WantedMotion
-from nuno.validation import finite_array, number
+from nuno.validation import checked, finite_array, number
 
 if TYPE_CHECKING:
     from nuno.robot.balance import Balance
     from nuno.robot.humanoid import Humanoid
     from nuno.robot.links import Links
     from nuno.robot.reported_joints import Angles
+    from nuno.robot.sensors import Sensors
+    from nuno.robot.simulated_gripper import SimulatedGripper
     from nuno.robot.simulated_joints import SimulatedJoints
     from nuno.world.world import World
+
+
+logger = logging.getLogger(__name__)
 
 
 class OriginalRobot(Protocol):
@@ -37,6 +45,8 @@ class OriginalRobot(Protocol):
     joints: SimulatedJoints
     guard: MotionGuard
     balance: Balance | None
+    sensors: Sensors
+    grippers: dict[str, SimulatedGripper]
     collisions: str
 
     @property
@@ -56,8 +66,8 @@ class OriginalRobot(Protocol):
 class ImaginedRobot:
     """A robot in every world of a batch: ``world.imagine(n).robot``.
 
-    What is under way in the robot's world goes on in each of them. Commands may differ from world to world. Sensors and
-    cameras are the original's alone.
+    What is under way in the robot's world goes on in each of them. Commands may differ from world to world. Sensors are
+    exact, whatever models the original's have; cameras are the original's alone.
 
     Args:
         original: The robot.
@@ -76,6 +86,9 @@ class ImaginedRobot:
         self.original, self.world = original, world
         self.joint_names = original.actual.joint_names
         state, motion, self._servo, found = original.saved() if of is None else of[0].saved_of(of[1])
+        # what is under way as the robot itself is imagined, and what each copy was sent since
+        self._under_way: Any = motion if of is None else of[0]._under_way
+        self._sent: list[tuple[Sent, ...]] = [() if of is None else of[0]._sent[of[1]]] * world.world_count
         self._links = [world.find(body.name) for body in original.links.bodies]
         self.balance: Balance | None = None
         if original.balance is not None and (original.is_dynamic if of is None else of[0].balance is not None):
@@ -97,7 +110,15 @@ class ImaginedRobot:
             self._guards.append(MotionGuard(original.links, original.collisions, world, above, k))
             self._guards[k].load(found)
             own.gait.looks = self._guards[k].velocities_of(own)
+        if closing := [name for name, own in original.grippers.items() if of is None and own.will_hold]:
+            logger.warning(
+                "%s of %r closes: its copies' fingers go on, but grip nothing there; imagine when it holds",
+                " and ".join(closing), original.actual.name,
+            )  # fmt: skip
         self._before = self._states
+        self._ground = original.sensors.ground
+        self._sensors: ImaginedSensors | None = None  # made when they are first read
+        self._read: ImaginedReadings | None = None
         self._batch = LinkBatch(original.links, world, self._links)
         self._together = MotionBatch(original.actual, self._motions, self._guards)
 
@@ -110,6 +131,43 @@ class ImaginedRobot:
         """Return where the robot is and how it moves, and whether it fell, of each world."""
         with self.world.lock:
             return tuple(self._states)
+
+    def state_arrays(self) -> RobotStates:
+        """Return what ``state`` tells as arrays over worlds."""
+        with self.world.lock:
+            return RobotStates.of(self._states, self.original.actual)
+
+    def read(self) -> ImaginedReadings:
+        """Return what all sensors tell in each world, read once a frame; they are exact.
+
+        As of the robot itself, without dynamics forces follow by inverse dynamics with what the bodies of each world do
+        to the links there; with dynamics from what the joints bore in the last frame.
+
+        Raises:
+            BodyStateError: a link was removed from the batch.
+        """
+        with self.world.lock:
+            if not self._is_whole():
+                raise BodyStateError(f"the copies of {self.original.actual.name!r} lack links; imagine the batch anew")
+            if self._read is None or self._read.time != self.world.time:
+                if self._sensors is None:
+                    own = self.original
+                    self._sensors = ImaginedSensors(own.actual, own.links, self.world, self._links, self._ground)
+                self._read = self._sensors.read_worlds(self._states, self.world.time)
+            return self._read
+
+    @checked
+    def read_wrench(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return forces [N] and torques [N m] of what lies beyond a sensor, (worlds, 3) each; see ``RobotInterface``.
+
+        Raises:
+            RobotModelError: the robot has no such sensor.
+            BodyStateError: a link was removed from the batch.
+        """
+        found = self.read().wrenches.get(frame)
+        if found is None:
+            raise RobotModelError(f"{self.original.actual.name!r} has no force sensor in {frame!r}")
+        return found[:, :3].copy(), found[:, 3:].copy()
 
     def angle_vector(
         self, angles: ArrayLike | Mapping[str, ArrayLike] | None = None, seconds: float = 1.0
@@ -170,14 +228,16 @@ class ImaginedRobot:
             raise BodyStateError(f"{self.original.actual.name!r} walks or is under a servo command there")
         self._together.bring()
         shortest = self.original.angle_vector_duration
-        for own, begin, goals in zip(self._motions, self._present(), wanted, strict=True):
+        for k, (own, begin, goals) in enumerate(zip(self._motions, self._present(), wanted, strict=True)):
             steps = np.array([self.original.sub_angle_vector(b, a) for a, b in pairwise((begin, *goals))])
             needed = [shortest(a, b) for a, b in pairwise((begin, *goals))]
             longer = np.maximum(spans, needed)  # as the driver stretches what is too fast
             speeds, times = passing_velocities(steps, longer), np.cumsum(longer)
             for name, rows in own.joints.rows.items():
                 names = own.joints.controllers[name].names
-                own.joints.send(name, JointTrajectory(names, times, goals[:, rows], speeds[:, rows]))
+                trajectory = JointTrajectory(names, times, goals[:, rows], speeds[:, rows])
+                own.joints.send(name, trajectory)
+                self._sent[k] += (Sent(own.joints.clock, name, trajectory),)
 
     def _present(self) -> np.ndarray:
         """Return where the joints are (worlds, n), as encoders tell the driver, which plans from there."""
@@ -191,6 +251,10 @@ class ImaginedRobot:
         self._together.bring()
         found = self._guards[world].save() if self._guards else None
         return self._states[world], self._motions[world].save(), self._servo, found
+
+    def commanded_in(self, world: int) -> tuple[Any, Any, tuple[Sent, ...]]:
+        """Return what was under way as the robot was imagined, its servo command, and what a copy was sent since."""
+        return self._under_way, self._servo, self._sent[world]
 
     # What the world asks of it
 
@@ -247,12 +311,13 @@ class ImaginedRobot:
         joints = () if self.balance is None else self.balance.dynamics.save()
         found = [guard.save() for guard in self._guards]
         self._together.bring()
-        return list(self._states), [own.save() for own in self._motions], joints, self._servo, found
+        motions, sent = [own.save() for own in self._motions], list(self._sent)
+        return list(self._states), motions, joints, self._servo, found, sent
 
     def load(self, saved: Any) -> None:
         """Become what it was when a snapshot was taken."""
-        states, motions, joints, self._servo, found = saved
-        self._states = list(states)
+        states, motions, joints, self._servo, found, sent = saved
+        self._states, self._read, self._sent = list(states), None, list(sent)
         self._together.forget()
         for own, motion in zip(self._motions, motions, strict=True):
             own.load(motion)

@@ -14,6 +14,7 @@ from nuno.joints.held_points import held_points
 from nuno.materials import Cloth
 from nuno.robot.ground import moment
 from nuno.robot.static_boxes import StaticBoxes
+from nuno.robot.world_reader import WorldReader, of_world
 
 if TYPE_CHECKING:
     from nuno.robot.links import Links
@@ -67,31 +68,41 @@ class LinkLoads:
         links: The links.
         groups: Of each of the links' bodies; forces on a group are told as if on the one of its links that was touched
             and is nearest to the base. None are links that one joint carries.
+        reader: What reads the world; of a batch, of whose worlds each has its loads, it is shared by them and renewed
+            by whoever made it. None reads the links' own world.
+        bodies: The links' copies in that batch.
+        index: Which of its worlds.
     """
 
-    def __init__(self, links: Links, groups: Sequence[Hashable] | None = None) -> None:
-        self._world = links.world
+    def __init__(
+        self, links: Links, groups: Sequence[Hashable] | None = None, *, reader: WorldReader | None = None,
+        bodies: Sequence[Body] = (), index: int = 0,
+    ) -> None:  # fmt: skip
+        self._reader = WorldReader(links.world) if reader is None else reader
+        self._world, self._k = self._reader.world, index
         self._groups: Sequence[Hashable] = links.joints if groups is None else groups
-        self._index = {body: k for k, body in enumerate(links.bodies)}
+        self._index = {body: k for k, body in enumerate(bodies or links.bodies)}
         self._joints = links.joints
         self._read_at: tuple[float, tuple[str, ...]] | None = None
+        self._version: int | None = None
         self._loads: tuple[Load, ...] = ()
         self._motions: dict[Body, _Motion] = {}
         self._noted: dict[Body, _Motion] = {}
         self._contacts: dict[Body, list[Load]] = {}
-        self._arrays: dict[Body, tuple[Any, list[np.ndarray]]] = {}  # places and velocities of vertices, by solver
-        self._boxes = StaticBoxes(self._world)
+        self._boxes = StaticBoxes(self._world, index)
         self._static_groups: list[Hashable | None] = []
 
     def read(self) -> tuple[Load, ...]:
         """Return all loads, those of the last frame."""
         world = self._world
         with world.lock:
+            self._follow()
             moving = self._moving()
-            now = (world.time, tuple(grip.key for body in moving for grip in body._dynamics.grips))
+            now = (world.time, tuple(grip.key for body in moving for grip in moving[body].grips))
             if now != self._read_at:
-                self._loads = tuple(load for body in moving for load in self._of(body))
-                of_bodies: tuple[dict[Body, Any], ...] = (self._motions, self._contacts, self._arrays)
+                self._loads = tuple(load for body, dynamics in moving.items() for load in self._of(body, dynamics))
+                self._reader.keep_only(list(moving))
+                of_bodies: tuple[dict[Body, Any], ...] = (self._motions, self._contacts)
                 for kept in of_bodies:
                     for body in [body for body in kept if body not in moving]:
                         del kept[body]
@@ -101,38 +112,48 @@ class LinkLoads:
     def note(self) -> None:
         """Take note of how bodies move now, for a reading in the next frame; what bears on links is not worked out."""
         with self._world.lock:
+            self._follow()
             self._noted = {}
-            for body in self._moving():
-                dynamics = dynamics_of(body)
+            for body, dynamics in self._moving().items():
                 if isinstance(dynamics, ParticleDynamics) and _has_momentum(dynamics):
-                    rows = self._rows_of(body, dynamics.solver)
-                    self._noted[body] = _motion_of(rows, dynamics.solver.mass[0], self._world.time)
+                    self._noted[body] = self._motion_of(dynamics, self._reader.rows(body, dynamics.solver, self._k))
 
-    def _moving(self) -> list[Any]:
-        """Return all bodies with dynamics but the links."""
-        return [body for body in self._world._bodies.values() if body.is_dynamic and body not in self._index]
+    def _follow(self) -> None:
+        """Forget what was, where bodies may have been put elsewhere, or the world restored, since it was read."""
+        version = self._world._collider_version
+        if version != self._version:
+            self._version, self._read_at = version, None
+            for kept in (self._motions, self._noted, self._contacts):
+                kept.clear()
 
-    def _of(self, body: Body) -> list[Load]:
-        dynamics: Any = body._dynamics
+    def _moving(self) -> dict[Body, Any]:
+        """Return all bodies with dynamics but the links, and their dynamics."""
+        bodies = [body for body in self._world._bodies.values() if body.is_dynamic and body not in self._index]
+        return {body: dynamics_of(body) for body in bodies}
+
+    def _motion_of(self, dynamics: ParticleDynamics, rows: np.ndarray) -> _Motion:
+        return _motion_of(rows, of_world(dynamics.solver.mass, self._k), self._world.time)
+
+    def _of(self, body: Body, dynamics: Any) -> list[Load]:
         motion = before = None
         if isinstance(dynamics, ParticleDynamics):
-            rows = self._rows_of(body, dynamics.solver)
+            rows = self._reader.rows(body, dynamics.solver, self._k)
             x = rows[:3]
             if _has_momentum(dynamics):
-                motion = _motion_of(rows, dynamics.solver.mass[0], self._world.time)
+                motion = self._motion_of(dynamics, rows)
                 before, self._motions[body] = self._motions.get(body), motion
                 noted = self._noted.pop(body, None)
                 if noted is not None and noted.time != motion.time:
                     before = noted
         else:
-            x = _places(body)
+            x = self._reader.places(body, self._k)
         held_by = [self._index.get(grip.target) for grip in dynamics.grips if grip.target is not None]
         step = 0.0 if motion is None or before is None else motion.time - before.time
         known = 0.0 < step < 1.5 / self._world.frame_rate
         known = known and not any(body in coupled.bodies for coupled in self._world._stepping.last)
         holding = {None if k is None else self._groups[k] for k in held_by}
         all_held = len(held_by) == len(dynamics.grips)
-        near = self._near(body, x, holding.pop() if known and all_held and len(holding) == 1 else None)
+        near = self._near(body, dynamics, x, holding.pop() if known and all_held and len(holding) == 1 else None)
         supports = [self._index[other] for other in near if other in self._index]
         bearing = supports + [k for k in held_by if k is not None]
         if not bearing:
@@ -140,7 +161,7 @@ class LinkLoads:
             return []
         known = known and len(supports) == len(near)
         if known and motion is not None and before is not None:
-            missing = _missing(dynamics, x, before, motion, np.array(self._world.gravity))
+            missing = _missing(dynamics, x, before, motion, np.array(self._world.gravity), self._k)
             if all_held and len({self._groups[k] for k in bearing}) == 1:
                 # all that bears it is of one group: what it does there is all that is missing
                 self._contacts[body] = []
@@ -149,8 +170,8 @@ class LinkLoads:
         for grip in dynamics.grips:
             link = None if grip.target is None else self._index.get(grip.target)
             if link is not None or known:
-                own_force, own_torque = grip.wrench
-                point = held_points(grip, 0, x.T).mean(axis=0)
+                own_force, own_torque = self._reader.wrench(grip, self._k)
+                point = held_points(grip, self._k, x.T).mean(axis=0)
                 borne[:3] += own_force
                 borne[3:] += own_torque + moment(point, own_force)
                 if link is not None:
@@ -164,17 +185,6 @@ class LinkLoads:
         self._contacts[body] = found
         return loads + found
 
-    def _rows_of(self, body: Body, solver: Any) -> np.ndarray:
-        """Return the places [m] and velocities [m/s] of a body's vertices, (6, n) float, coordinates by rows."""
-        solver_before, arrays = self._arrays.get(body, (None, []))
-        if solver_before is not solver:
-            arrays = [array.numpy() for array in solver.arrays.values()]
-            if solver.device == "cpu":  # where that is the solver's own memory, and no copy
-                self._arrays[body] = (solver, arrays)
-        rows = np.array(arrays, dtype=float)
-        rows[:3] += solver.origin[0][:, None]
-        return rows
-
     def _one(self, links: list[int], missing: np.ndarray) -> Load:
         """All of a force and torque (6,) that a body lacks, on the one of some links that is nearest to the base."""
         return Load(min(links, key=self._joints.__getitem__), np.zeros(3), -missing[:3], -missing[3:])
@@ -182,15 +192,10 @@ class LinkLoads:
     def _asked(self, body: Body) -> list[Load]:
         """Return what the solver says of the body's contacts with links."""
         names = {other.name: k for other, k in self._index.items()}
-        found = self._world.contacts(body)
-        nothing = np.zeros(3)
-        return [
-            Load(names[name], point, -force, nothing)
-            for point, force, name in zip(found.points, found.forces, found.others, strict=True)
-            if name in names
-        ]
+        found, nothing = self._reader.contacts(body, self._k), np.zeros(3)
+        return [Load(names[name], point, -force, nothing) for point, force, name in found if name in names]
 
-    def _near(self, body: Body, x: np.ndarray, holding: Hashable | None) -> list[Body]:
+    def _near(self, body: Body, dynamics: Any, x: np.ndarray, holding: Hashable | None) -> list[Body]:
         """The static bodies whose boxes have a vertex of the body in them or near, of those that it touches.
 
         Where one group holds the body and no others come into question, those are not looked at closer: what the group
@@ -201,14 +206,14 @@ class LinkLoads:
             links = [self._index.get(other) for other in boxes.bodies]
             self._static_groups = [None if k is None else self._groups[k] for k in links]
         material = body.material
-        thickness = _of_one_world(material.thickness) if isinstance(material, Cloth) else body.thickness
+        thickness = of_world(material.thickness, self._k) if isinstance(material, Cloth) else body.thickness
         margin = 0.5 * thickness + NEAR
         low, high = x.min(axis=1), x.max(axis=1)
         close = boxes.close_to(low, high, margin)
         close = [k for k in close if self._world._rules.touch(body, boxes.bodies[k])]
         held = [k for k in close if holding is not None and self._static_groups[k] == holding]
         others = [k for k in close if k not in held]
-        if body._dynamics is None or not body._dynamics.is_rigid:  # a large face of those may touch where no corner is
+        if not dynamics.is_rigid:  # a large face of those may touch where no corner is
             others = [k for k in others if boxes.hold_any(k, x, low, high, margin)]
         return [boxes.bodies[k] for k in (*held, *others)]
 
@@ -216,12 +221,6 @@ class LinkLoads:
 def _has_momentum(dynamics: ParticleDynamics) -> bool:
     """Return True if a body's momentum tells what bears it: what it is tied to has some of it else."""
     return not any(grip.is_tie for grip in dynamics.grips)
-
-
-def _places(body: Body) -> np.ndarray:
-    """Return the vertices of a dynamic body, (3, n) float [m], coordinates by rows."""
-    x = body._vertices()
-    return (x[0] if x.ndim == 3 else x).T
 
 
 def _motion_of(rows: np.ndarray, mass: np.ndarray, time: float) -> _Motion:
@@ -237,24 +236,20 @@ def _moments(x: np.ndarray, forces: np.ndarray) -> np.ndarray:
     return (x[[1, 2, 0]] * forces[[2, 0, 1]] - x[[2, 0, 1]] * forces[[1, 2, 0]]).sum(axis=1)
 
 
-def _of_one_world(value: Any) -> float:
-    """Return what a material says of the one world that there is, for all worlds or for each."""
-    return float(np.asarray(value).flat[0])
-
-
 def _missing(
-    dynamics: ParticleDynamics, x: np.ndarray, before: _Motion, now: _Motion, gravity: np.ndarray
+    dynamics: ParticleDynamics, x: np.ndarray, before: _Motion, now: _Motion, gravity: np.ndarray, index: int = 0
 ) -> np.ndarray:
     """Return the force and torque (6,) that a body's motion took beside its weight, the air and pushes.
 
-    The torque is about the world's origin, and both are means between two times.
+    The torque is about the world's origin, and both are means between two times, in one of the worlds of a batch.
     """
     missing = (now.momentum - before.momentum) / (now.time - before.time)
     drag: Any = dynamics.material
-    missing += 0.5 * _of_one_world(drag.air_drag) * (now.momentum + before.momentum)
+    missing += 0.5 * of_world(drag.air_drag, index) * (now.momentum + before.momentum)
     missing[:3] -= now.mass * gravity
     missing[3:] -= moment(0.5 * (now.moment + before.moment), gravity)
     for push in dynamics.pushing(before.time):
-        missing[:3] -= push.force[0].sum(axis=0)
-        missing[3:] -= _moments(x, push.force[0].T)
+        force = of_world(push.force, index)
+        missing[:3] -= force.sum(axis=0)
+        missing[3:] -= _moments(x, force.T)
     return missing

@@ -1,14 +1,18 @@
-"""RobotState: where a robot is and how it moves, at one time."""
+"""RobotState: where a robot is and how it moves, at one time; RobotStates: that of all its copies, as arrays."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from nuno.robot.collision import Collision, Unbalance
 from nuno.robot.footing import Footing
+
+if TYPE_CHECKING:
+    from nuno.robot.humanoid import Humanoid
 
 Contacts = Mapping[str, Mapping[str, np.ndarray]]
 """By link and by the name of the other body, the force (3,) [N] on the link."""
@@ -67,3 +71,60 @@ class RobotState:
         state.__dict__.update(self.__dict__)
         state.__dict__.update(over_torque=over_torque, unbalanced=unbalanced, collision=collision)
         return state
+
+
+@dataclass(frozen=True, eq=False)
+class RobotStates:
+    """Configurations and motions of a robot's copies, as arrays over worlds.
+
+    Attributes:
+        time: [s], of the batch.
+        base: (worlds, 7) float, position [m] and quaternion (w, x, y, z) of the base link.
+        base_velocity: (worlds, 6) float, of the base in its own frame [m/s, rad/s].
+        base_acceleration: (worlds, 6) float, likewise, without gravity [m/s2, rad/s2].
+        positions: (worlds, n) float [rad; m for slides], of the joints in the order of ``joint_names``.
+        velocities: (worlds, n) float [rad/s; m/s].
+        accelerations: (worlds, n) float [rad/s2; m/s2].
+        torques: (worlds, n) float [N m; N], of the motors of a robot with dynamics; NaN else.
+        fallen: (worlds,) bool, whether a robot with dynamics fell.
+        over_torque: (worlds, n) bool, which motors gave all that they can.
+        collided: (worlds,) bool, whether the motion of a robot without dynamics was stopped, or would run into
+            something.
+    """
+
+    time: float
+    base: np.ndarray
+    base_velocity: np.ndarray
+    base_acceleration: np.ndarray
+    positions: np.ndarray
+    velocities: np.ndarray
+    accelerations: np.ndarray
+    torques: np.ndarray
+    fallen: np.ndarray
+    over_torque: np.ndarray
+    collided: np.ndarray
+
+    @staticmethod
+    def of(states: Sequence[RobotState], robot: Humanoid) -> RobotStates:
+        """Return the states of a robot's copies as arrays.
+
+        Args:
+            states: One of each world, at the same time.
+            robot: The robot.
+        """
+        q, v, a = (np.array([getattr(own, name) for own in states]) for name in ("q", "v", "a"))
+        names = robot.joint_names
+        unknown = np.full(len(names), np.nan)
+        return RobotStates(
+            states[0].time,
+            q[:, [0, 1, 2, 6, 3, 4, 5]],
+            v[:, :6],
+            a[:, :6],
+            robot.angles_of(q),
+            v[:, 6:],
+            a[:, 6:],
+            np.array([unknown if own.torques is None else own.torques for own in states]),
+            np.array([own.fallen is not None for own in states]),
+            np.array([[name in own.over_torque for name in names] for own in states]),
+            np.array([own.collision is not None for own in states]),
+        )

@@ -60,6 +60,11 @@ class SimulatedGripper:
         joint = hand.description.joint
         self._controller = next((name for name, own in joints.controllers.items() if joint in own.names), None)
 
+    @property
+    def will_hold(self) -> bool:
+        """Return True while a hand closes that is to grip what is between its fingers when they have."""
+        return self._closes and self.goal is not None and not self.goal.is_done and not self.hand.presses
+
     def send(self, position: float, effort: float = np.inf) -> Goal:
         """Let the hand open to ``position``, from 0 (closed) to 1, in place of what it does now.
 

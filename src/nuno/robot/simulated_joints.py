@@ -3,20 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from nuno.errors import InvalidInputError
 from nuno.robot.goal import Goal, GoalStatus, ResultCode, Tolerances
 from nuno.robot.trajectory import JointTrajectory, Motion, evaluate, resting_at, with_derivatives
-from nuno.robot.trajectory_controller import TrajectoryController
+from nuno.robot.trajectory_controller import Later, TrajectoryController
 
 if TYPE_CHECKING:
     from nuno.robot.humanoid import Humanoid
 
 ROUNDING = 1.0 + 1e-9
 """Of a step at the velocity limit."""
+
+
+class Sent(NamedTuple):
+    """A trajectory that was sent to a controller.
+
+    Attributes:
+        clock: When [s] of the joints' clock.
+        controller: The controller's name.
+        trajectory: What.
+    """
+
+    clock: float
+    controller: str
+    trajectory: JointTrajectory
 
 
 class SimulatedJoints:
@@ -229,6 +243,29 @@ class SimulatedJoints:
         goal = self.controllers[name].accept(trajectory, self.clock, start_time, tolerances)
         self._ask(name)
         return goal
+
+    def are_as(self, saved: tuple[Any, ...]) -> bool:
+        """Return True if time and positions are what they were when ``save`` returned that."""
+        own, _ = saved
+        return self.clock == own[0] and np.array_equal(self.positions, own[1])
+
+    def follow(self, saved: tuple[Any, ...], sent: Sequence[Sent]) -> bool:
+        """Do from now on what other joints of these names did from a time on; return whether that is anything.
+
+        Args:
+            saved: What they were then, as ``save`` tells it.
+            sent: What their controllers were sent from then on.
+        """
+        then, goes_on = saved[0][0], self.are_as(saved)
+        for name, controller in self.controllers.items():
+            own = [Later(each.clock, each.trajectory) for each in sent if each.controller == name]
+            if goes_on:
+                controller.go_on(saved[1][name], own)
+            else:
+                positions = self.positions[self.rows[name]]
+                controller.begin_anew(saved[1][name], own, then, self.clock, positions)
+            self._ask(name)
+        return any(controller.end > self.clock for controller in self.controllers.values())
 
     def save(self) -> tuple[Any, ...]:
         """Return all that they are, for ``load``."""

@@ -389,6 +389,12 @@ class SimulatedRobot(SimulatedBody):
                 self.load((state, motion, joints, grippers, servo, guard, self._burden.save()))
                 self._motion.disown()
 
+    def future_commands(self, futures: World, k: int) -> Callable[[], None]:
+        """Return what lets the robot do from now on what its copy in one world of a batch was told to."""
+        from nuno.robot.future_commands import future_commands
+
+        return future_commands(self, futures, k)
+
     def _serve(self, before: RobotState, others: Any, base: Any, span: float) -> tuple[np.ndarray, Any]:
         assert self._servo is not None
         return self._servo.rows, self._servo.step(before, others, base, span, self._external())

@@ -19,13 +19,14 @@ class StaticBoxes:
 
     Args:
         world: The world.
+        index: Which of a batch.
 
     Attributes:
         bodies: The bodies that others may touch, m of them, at the last ``follow``.
     """
 
-    def __init__(self, world: World) -> None:
-        self._world = world
+    def __init__(self, world: World, index: int = 0) -> None:
+        self._world, self._index = world, index
         self._version: int | None = None
         self.bodies: list[Body] = []
         self._where: list[np.ndarray] = []
@@ -42,6 +43,7 @@ class StaticBoxes:
             self._radii = np.linalg.norm(np.abs(self._middles) + self._halves, axis=1)
         poses = [body.pose() for body in self.bodies]
         where = [*(place for place, _ in poses), *(turn for _, turn in poses)]
+        where = [own if own.ndim == 1 else own[self._index] for own in where]
         # a body that moves has other arrays from then on, never other numbers in the same
         if renewed or not all(map(is_, where, self._where)):
             self._where = where

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import logging
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,6 +19,7 @@ ARRIVED = 1e-3
 """[rad; m] How near the joints must come to the last point, where a goal says nothing of it."""
 SOON = 1e-9
 """[s] Rounding of sums of frames."""
+OTHERS = "the commands of a future took its place"
 
 
 class Feedback(NamedTuple):
@@ -55,6 +57,19 @@ class Feedback(NamedTuple):
         return np.array(self.desired[0] - self.actual[0])
 
 
+@dataclass(frozen=True, eq=False)
+class Later:
+    """A trajectory that a controller is to be sent at a time to come.
+
+    Attributes:
+        start: When [s] of the controller's clock.
+        trajectory: What.
+    """
+
+    start: float
+    trajectory: JointTrajectory
+
+
 class TrajectoryController:
     """Some joints, and the trajectory that they follow.
 
@@ -82,12 +97,13 @@ class TrajectoryController:
         self.tolerances = Tolerances()
         self._spline: Spline | None = None
         self._next: tuple[float, float, JointTrajectory] | None = None  # its start, when it is joined, and it
+        self._later: tuple[Later, ...] = ()  # what comes after that, each as if it were sent then
         self.piece = Piece(0.0, np.inf, resting_at(positions))
 
     @property
     def is_busy(self) -> bool:
-        """Return True if a goal is under way."""
-        return self.goal is not None and not self.goal.is_done
+        """Return True if a goal is under way, or one is to come."""
+        return bool(self._later) or (self.goal is not None and not self.goal.is_done)
 
     @property
     def next_event(self) -> float:
@@ -95,6 +111,8 @@ class TrajectoryController:
         if self.is_busy and self.tolerances.path:
             return -np.inf
         earliest = np.inf if self._next is None else self._next[1]
+        if self._later:
+            earliest = min(earliest, self._later[0].start)
         if self._spline is not None:
             earliest = min(earliest, self.piece.end, self._spline.end if self.is_busy else np.inf)
         return float(earliest - 2.0 * SOON)
@@ -118,14 +136,56 @@ class TrajectoryController:
         if goal.is_done:
             logger.warning("a goal was rejected: %s", goal.text)
             return goal
-        if self.goal is not None:
-            self.goal.finish(GoalStatus.PREEMPTED, ResultCode.INVALID_GOAL, "another goal took its place")
-        self.goal, self.tolerances = goal, wanted
-        goal.status = GoalStatus.ACTIVE
+        self._take_goal(goal, wanted)
+        self._later = ()
         start = now + start_time
         self._next = (start, max(start, now), self._within_limits(trajectory.of(self.names)))
         self.advance(now)
         return goal
+
+    def _take_goal(self, goal: Goal, tolerances: Tolerances) -> None:
+        if self.goal is not None:
+            self.goal.finish(GoalStatus.PREEMPTED, ResultCode.INVALID_GOAL, "another goal took its place")
+        self.goal, self.tolerances = goal, tolerances
+        goal.status = GoalStatus.ACTIVE
+
+    def go_on(self, under_way: tuple[Any, ...], sent: Sequence[Later]) -> None:
+        """Become what the controller was, and take later what another one was sent from then on.
+
+        Args:
+            under_way: What it was, as ``save`` tells it, at the present time of its clock.
+            sent: What it is sent.
+        """
+        if self.goal is not None and self.goal is not under_way[4]:
+            self.goal.finish(GoalStatus.PREEMPTED, ResultCode.INVALID_GOAL, OTHERS)
+        self.load(under_way)
+        if self._next is not None and sent and sent[0].start < self._next[1] - SOON:
+            self._next = None  # what was sent earlier takes its place
+        self._later = _queued(self._later, sent)
+
+    def begin_anew(
+        self, under_way: tuple[Any, ...], sent: Sequence[Later], then: float, now: float, positions: np.ndarray
+    ) -> None:  # fmt: skip
+        """Do from now on what another controller of these joints did from a time on, wherever they are.
+
+        Args:
+            under_way: What it did at that time, as ``save`` tells it.
+            sent: What it was sent from then on.
+            then: That time [s] of its clock.
+            now: The time [s] of this one's.
+            positions: Where the joints are now (m,).
+        """
+        _, spline, after, _, _, _, later = under_way
+        waiting = [] if after is None else [Later(after[0], after[2])]
+        if spline is not None and (rest := _rest_of(spline, then)) is not None:
+            waiting.insert(0, Later(then, rest))
+        queue = _queued((*waiting, *later), sent)
+        if queue and queue[0].start <= then + SOON:  # from how the joints move now
+            if self.goal is not None:
+                self.goal.finish(GoalStatus.PREEMPTED, ResultCode.INVALID_GOAL, OTHERS)
+        else:
+            self.hold(positions, GoalStatus.PREEMPTED, ResultCode.INVALID_GOAL, OTHERS)
+        self._next, self._later = None, tuple(Later(now + (own.start - then), own.trajectory) for own in queue)
 
     def cancel(self, positions: np.ndarray) -> None:
         """Give the goal up, and hold the joints at positions (m,)."""
@@ -135,15 +195,19 @@ class TrajectoryController:
         """End the goal, and hold the joints at positions (m,)."""
         if self.goal is not None:
             self.goal.finish(status, code, text)
-        self._spline = self._next = None
+        self._spline, self._next, self._later = None, None, ()
         self.piece = Piece(0.0, np.inf, resting_at(np.array(positions)))
 
     def move_rest(self, positions: np.ndarray) -> None:
         """Hold the joints at positions (m,) that something else has brought them to; a goal under way is aborted."""
         self.hold(positions, GoalStatus.ABORTED, ResultCode.INVALID_GOAL, "the joints are moved by something else")
 
-    def advance(self, time: float) -> bool:
+    def advance(self, time: float, tells: bool = True) -> bool:
         """Take up the polynomial for a time [s] that does not lie before those asked for so far.
+
+        Args:
+            time: [s].
+            tells: Whether goals are told.
 
         Returns:
             Whether ``piece`` is another one now.
@@ -154,6 +218,13 @@ class TrajectoryController:
             first = (self.piece if self._spline is None else self._spline).at(joined)
             self._spline, self._next = Spline(start, joined, first, trajectory), None
             renewed = True
+        while self._later and time > self._later[0].start + SOON:  # in the frame after it, as what is sent between two
+            own, self._later = self._later[0], self._later[1:]
+            first = (self.piece if self._spline is None else self._spline).at(own.start)
+            self._spline, self._next = Spline(own.start, own.start, first, own.trajectory), None
+            if tells:
+                self._take_goal(Goal(own.trajectory), Tolerances())
+            renewed = True
         if self._spline is not None and (renewed or time >= self.piece.end):
             self.piece = self._spline.piece(time)
             renewed = True
@@ -162,6 +233,8 @@ class TrajectoryController:
     @property
     def end(self) -> float:
         """The time when the joints come to rest [s], as far as is known now; -inf where nothing is asked of them."""
+        if self._later:
+            return self._later[-1].start + self._later[-1].trajectory.duration
         if self._next is not None:
             return self._next[0] + self._next[2].duration
         return -np.inf if self._spline is None else self._spline.end
@@ -170,8 +243,9 @@ class TrajectoryController:
         """Return where the joints are wanted (k, m) at times (k,) [s] to come, increasing; nothing changes."""
         found, own, k = np.empty((len(times), len(self.names))), copy.copy(self), 0
         while k < len(times):
-            own.advance(float(times[k]))
+            own.advance(float(times[k]), tells=False)
             end = own.piece.end if own._next is None else min(own.piece.end, own._next[1] - SOON)
+            end = min(end, own._later[0].start + SOON) if own._later else end
             last = max(k + 1, int(np.searchsorted(times, end)))
             spans = (times[k:last] - own.piece.start)[:, None]
             part = np.zeros((last - k, len(self.names)))
@@ -230,11 +304,11 @@ class TrajectoryController:
         """Return all that it is, for ``load``."""
         goal = self.goal
         outcome = None if goal is None else (goal.status, goal.code, goal.text, goal.feedback)
-        return self.piece, self._spline, self._next, self.tolerances, goal, outcome
+        return self.piece, self._spline, self._next, self.tolerances, goal, outcome, self._later
 
     def load(self, saved: tuple[Any, ...]) -> None:
         """Become what it was; a goal that came since is given up."""
-        piece, spline, after, tolerances, goal, outcome = saved
+        piece, spline, after, tolerances, goal, outcome, self._later = saved
         if self.goal is not None and self.goal is not goal:
             self.goal.finish(GoalStatus.PREEMPTED, ResultCode.INVALID_GOAL, "the world was restored")
         self.piece, self._spline, self._next, self.tolerances, self.goal = piece, spline, after, tolerances, goal
@@ -259,3 +333,22 @@ class TrajectoryController:
             if allowed > 0.0 and error[k] > allowed:
                 return f"{name} is {error[k]:.4f} from where it should be, more than {allowed:g}"
         return ""
+
+
+def _queued(waiting: Sequence[Later], sent: Sequence[Later]) -> tuple[Later, ...]:
+    """Return what waits, and what is sent, each of which takes the place of all that waits at its time."""
+    queue = list(waiting)
+    for own in sent:
+        queue = [*(before for before in queue if before.start <= own.start + SOON), own]
+    return tuple(queue)
+
+
+def _rest_of(spline: Spline, time: float) -> JointTrajectory | None:
+    """Return what is left of a trajectory at a time [s], None where it is over."""
+    own, passed = spline.trajectory, time - spline.start
+    left = own.times > passed + SOON
+    if not left.any():
+        return None
+    velocities = None if own.velocities is None else own.velocities[left]
+    accelerations = None if own.accelerations is None else own.accelerations[left]
+    return JointTrajectory(own.names, own.times[left] - passed, own.positions[left], velocities, accelerations)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import os
 from functools import partial
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -140,20 +140,32 @@ class Copying(Running):
                 futures.drivers.append(own)
         return futures
 
-    def adopt(self, futures: Self, k: int, *, world: int | None = None) -> None:
+    def adopt(
+        self, futures: Self, k: int, *, world: int | None = None, only: Literal["commands"] | None = None
+    ) -> None:  # fmt: skip
         """Become world ``k`` of a batch that was imagined from this one; Body objects keep their identity.
 
         Args:
             futures: The batch.
             k: Which of its worlds.
             world: Which world of this batch becomes that one, as by ``reset``; None where this is a single world.
+            only: "commands" leaves the world as it is, and lets its robots do from now on what their copies were told
+                in that future: trajectories under way as it was imagined, and those that were sent in it, each as long
+                after the first as there. None takes all.
 
         Raises:
-            InvalidInputError: not imagined from this world, or ``k`` or ``world`` out of range.
-            BodyStateError: this world is a batch itself, and ``world`` does not say which one is meant.
+            InvalidInputError: not imagined from this world, ``k`` or ``world`` out of range, or no such ``only``.
+            BodyStateError: this world is a batch itself, and ``world`` does not say which one is meant. Of commands
+                alone: there is no robot, or it is not in the futures, as one that has left this world; or it walks, or
+                did as they were imagined, and time has passed since.
         """
         if not isinstance(futures, Copying) or futures is self or futures._family != self._family:
             raise InvalidInputError("adopt needs a world that imagine of this world returned")
+        if only is not None:
+            if only != "commands":
+                raise InvalidInputError(f'only must be "commands" or None, got {only!r}')
+            self._adopt_commands(futures, check_world_index(k, futures.world_count), world)
+            return
         with futures._change("adopt"):
             snapshot = capture(futures, self._engine.name).pick(check_world_index(k, futures.world_count))
         with self._change("adopt"):
@@ -166,6 +178,17 @@ class Copying(Running):
                 take = getattr(driver, "take_future", None)
                 if take is not None:
                     take(futures, int(k))
+
+    def _adopt_commands(self, futures: Self, k: int, world: int | None) -> None:
+        """Let the robots of this world do from now on what their copies were told in world ``k`` of a batch."""
+        with futures._change("adopt"), self._change("adopt"):
+            self._chosen("adopt", world)
+            tellers = [getattr(driver, "future_commands", None) for driver in self.drivers]
+            commands = [tell(futures, k) for tell in tellers if tell is not None]
+            if not commands:
+                raise BodyStateError("there is no robot in this world whose commands could be adopted")
+            for carry_out in commands:
+                carry_out()
 
     def _chosen(self, what: str, world: int | None) -> int:
         """Return which world is meant.

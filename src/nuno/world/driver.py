@@ -9,7 +9,8 @@ class Driver(Protocol):
     """The driver of bodies of a world, asked around each frame, its lock held; see ``World.drivers``.
 
     One that goes along into imagined worlds has besides ``imagined(futures, world)``, which returns the driver of its
-    copies in a batch, and ``take_future(futures, k)``, by which it becomes its copy in world ``k`` of one.
+    copies in a batch, and ``take_future(futures, k)``, by which it becomes its copy in world ``k`` of one. Where it is
+    commanded, ``future_commands(futures, k)`` returns a function that lets it do from now on what that copy was told.
 
     One that can go on from where its bodies are has ``restored()``, which is called where the world was restored from
     what ``save`` of it is not part of, such as a file.

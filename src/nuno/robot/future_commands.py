@@ -1,0 +1,69 @@
+"""The commands of a future: what a robot's copy was told there, carried out by the robot itself from now on."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Protocol
+
+from nuno.errors import BodyStateError
+
+if TYPE_CHECKING:
+    from nuno.robot.gait import Gait
+    from nuno.robot.humanoid import Humanoid
+    from nuno.robot.servo import ServoCommand
+    from nuno.robot.simulated_joints import SimulatedJoints
+    from nuno.world.world import World
+
+logger = logging.getLogger(__name__)
+
+
+class CommandedRobot(Protocol):
+    """The robot that carries commands out; `SimulatedRobot` says what each member is."""
+
+    actual: Humanoid
+    joints: SimulatedJoints
+    gait: Gait
+
+    def saved(self) -> tuple[Any, Any, Any, Any]:
+        """Return its state, what is wanted of it, its servo command, and what was found of its way."""
+
+    def servo(self, command: ServoCommand | None) -> None:
+        """Put joints under a torque law, or give them back."""
+
+
+def future_commands(robot: CommandedRobot, futures: World, k: int) -> Callable[[], None]:
+    """Return what lets a robot do from now on what its copy in a future was told to.
+
+    Where the robot is as it was when it was imagined, its joints are wanted to the bit where the copy's were. Else what
+    was left then of trajectories under way begins from how its joints move now.
+
+    Args:
+        robot: The robot.
+        futures: The futures.
+        k: Which.
+
+    Raises:
+        BodyStateError: the robot is not in the futures; or it walks, or did as they were imagined, and time has passed.
+    """
+    name = robot.actual.name
+    copies: Any = next((other for other in futures.drivers if getattr(other, "original", None) is robot), None)
+    if copies is None:
+        raise BodyStateError(f"{name!r} is not in these futures: it entered the world after they were imagined")
+    under_way, servo, sent = copies.commanded_in(k)
+    _, _, joints, gait = under_way
+    goes_on = robot.joints.are_as(joints)
+    if not goes_on and robot.gait.is_walking:
+        raise BodyStateError(f"{name!r} walks, and these futures were imagined earlier: wait until it stands")
+    if not goes_on and gait[2] is not None:
+        raise BodyStateError(f"{name!r} walked as these futures were imagined, and has gone on since: imagine it anew")
+
+    def carry_out() -> None:
+        if goes_on:
+            robot.gait.load(gait)
+        if servo is not robot.saved()[2]:
+            robot.servo(None if servo is None else servo.command)
+        if not robot.joints.follow(joints, sent) and servo is None and not robot.gait.is_walking:
+            logger.warning("%r was told nothing in future %d, and holds its joints where they are", name, k)
+
+    return carry_out
