@@ -44,6 +44,7 @@ class FreeFall:
     missed = np.zeros(1, dtype=bool)
     resolution = None
     sums = None
+    memory_bytes = 0
 
     def __init__(self, topology, material, positions, velocities, *, device, gravity, frame_rate, substeps, friction):
         self.gravity, self.frame = np.array(gravity, dtype=np.float32), 1.0 / frame_rate

@@ -46,7 +46,7 @@ def room(k=None, device="cpu"):
         world.grip("towel", [vertex], to=corner)
     # the scarf hangs on the box by a corner, in the first two worlds
     held = np.where(np.arange(WORLDS)[:, None] < 2, [[0]], [[-1]])
-    world.grip("scarf", held if k is None else held[k], to=world.find("box"))
+    world.grip("scarf", held if k is None else held[k : k + 1], to=world.find("box"))
     return world
 
 

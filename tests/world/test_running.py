@@ -15,7 +15,7 @@ def scene():
     return world, world.attach(world.add(nuno.sheet((0.1, 0.1), cells=(2, 2), name="towel", position=(0, 0, 1))))
 
 
-@pytest.mark.parametrize("seconds", [1e30, 1.1e9, 1.7976931348623157e308])
+@pytest.mark.parametrize("seconds", [1e30, 1.1e9, 3.0e38])
 @pytest.mark.parametrize("verb", ["run", "record"])
 def test_a_time_that_the_clock_does_not_count_is_refused(seconds, verb):
     """Promise: an error that names the time and the bound, and a world as it was."""

@@ -125,16 +125,18 @@ def chosen_points(
         (worlds, k, 3).
 
     Raises:
-        InvalidInputError: an index out of range, of another shape, or -1 for all.
+        InvalidInputError: an index out of range, of another shape, or -1 for all of those that hold in every world.
     """
     if not isinstance(where, SurfacePoints):
         given = [where] if isinstance(where, int | np.integer) else where
         indices = index_array("where", given, ("k",), (worlds, "k"), low=-1, high=vertex_count)
         _check_once(indices)
-        _check_any(indices)
+        if indices.ndim == 1:
+            _check_any(indices)
         return np.array(np.broadcast_to(indices, (worlds, indices.shape[-1]))), None, None
     chosen = index_array("where.faces", where.faces, ("k",), (worlds, "k"), low=-1, high=len(faces))
-    _check_any(chosen)
+    if chosen.ndim == 1:
+        _check_any(chosen)
     corners = np.where((chosen >= 0)[..., None], faces[chosen], -1)
     shape = (worlds, *corners.shape[-2:])
     return None, np.array(np.broadcast_to(corners, shape)), np.array(np.broadcast_to(where.barycentric, shape))

@@ -162,7 +162,7 @@ class Copying(Running):
         if not isinstance(futures, Copying) or futures is self or futures._family != self._family:
             raise InvalidInputError("adopt needs a world that imagine of this world returned")
         if only is not None:
-            if only != "commands":
+            if not (isinstance(only, str) and only == "commands"):
                 raise InvalidInputError(f'only must be "commands" or None, got {only!r}')
             self._adopt_commands(futures, check_world_index(k, futures.world_count), world)
             return
