@@ -2,7 +2,7 @@
 
 import pytest
 
-from nuno.tables.joint_trees import ANCHOR, find_trees, tree_table
+from nuno.tables.joint_trees import ANCHOR, find_trees
 
 
 def carried(forest, pairs):
@@ -57,22 +57,6 @@ def test_a_free_tree_has_the_body_with_most_joints_as_its_root():
 def test_loops_and_single_joints_are_in_no_tree(pairs):
     """Two ways to what is static are a loop, too."""
     assert find_trees(pairs).lone == list(range(len(pairs)))
-
-
-def test_a_table_finds_what_a_node_carries_and_which_body_it_is():
-    """A torso with two arms, one of two links and one held by its other end: each joint is found from its carrier."""
-    pairs = [(4, 2), (5, 4), (2, 7)]
-    table, forest = tree_table(pairs, 1, "cpu"), find_trees(pairs)
-    heirs, later = table.heir.numpy(), table.next_heir.numpy()
-    for node in range(len(heirs)):
-        found, joint = [], int(heirs[node])
-        while joint >= 0:
-            found.append(joint)
-            joint = int(later[joint])
-        assert found == [k for k, carrier in enumerate(forest.carriers) if carrier == node][::-1]
-    bodies = [pairs[k][flipped] for k, flipped in zip(forest.joints, forest.flipped, strict=True)] + forest.roots
-    assert sorted(bodies) == [2, 4, 5, 7]
-    assert [table.node_of.numpy()[body] for body in bodies] == list(range(len(bodies)))
 
 
 def test_trees_and_loops_beside_each_other():

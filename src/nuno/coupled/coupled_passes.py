@@ -14,7 +14,6 @@ from nuno.coupled.pass_progress import ENOUGH, Passing, begin_pass, end_pass, go
 from nuno.coupled.rigid_supports import link_supports, rubs_both, with_mate
 from nuno.coupled.row_projections import drag_row, join_row, push_row
 from nuno.coupled.tie_constraints import Holds, Ties, project_hold, project_tie, sum_hold, sum_tie
-from nuno.coupled.tree_replies import forget_pushes
 from nuno.numbers.crew import barrier
 from nuno.numbers.warps import anyone
 from nuno.rigid.convex import Parts
@@ -141,7 +140,6 @@ def solve(
             holds.twist[world * holds.count + k] = wp.vec3(0.0, 0.0, 0.0)
         for k in range(joints.count):
             begin_joint(joints, world, k)
-        forget_pushes(trees, world)
     linked_count = int(0)
     if at_once == 0:
         linked_count = link_supports(particles, rows, passing, world, first, base, count)
@@ -192,9 +190,7 @@ def solve(
             take_sums(particles, rigid, first, start, rank, size)
             barrier(size)
         if joints.count > 0 or linked_count > 0:
-            off = resolve_entries(
-                rigid, parts, manifolds, joints, trees, passing, world, dt, k_pass, counts, rank, size
-            )
+            off = resolve_entries(rigid, parts, manifolds, joints, passing, world, dt, k_pass, counts, rank, size)
             wrong = wp.max(wrong, off)
         if rank == 0:
             for k in range(ties.count):

@@ -27,7 +27,7 @@ import warp as wp
 from nuno.coupled.articulated_inertia import body_inertia, rest_of, seen_from
 from nuno.coupled.drive_constraints import project_ball
 from nuno.coupled.joint_opening import (
-    ENOUGH_ROTATION,
+    ENOUGH_TURN,
     ENOUGH_WAY,
     Trees,
     arms_of,
@@ -39,7 +39,6 @@ from nuno.coupled.joint_opening import (
 from nuno.coupled.joint_response import BALL, HINGE, SLIDER, Joints, block_of
 from nuno.coupled.pass_progress import Passing, goes_on, island_of
 from nuno.coupled.tie_constraints import within
-from nuno.coupled.tree_replies import renew_replies
 from nuno.rigid.rigid_body import RigidState, shift_body, turn_body
 
 PIVOTED = wp.constant(1.0e-6)
@@ -69,7 +68,7 @@ def close_joint(rigid: RigidState, joints: Joints, trees: Trees, world: int, t: 
     went = float(0.0)
     if kind == BALL:
         held = shift * trees.node[nodes + t].b + trees.node[nodes + t].c * turn
-        ball_turn = trees.opening[at].swivel * -held
+        ball_turn = trees.opening[at].ball_gives * -held
         went = wp.length(ball_turn)
         turn = turn + ball_turn
     elif kind == HINGE or kind == SLIDER:
@@ -80,7 +79,7 @@ def close_joint(rigid: RigidState, joints: Joints, trees: Trees, world: int, t: 
             turn = turn + (sign * q) * axis
         else:
             shift = shift + (sign * q) * axis
-    trees.wrong[at] = wp.max(trees.wrong[at], went - wp.where(kind == SLIDER, ENOUGH_WAY, ENOUGH_ROTATION))
+    trees.wrong[at] = wp.max(trees.wrong[at], went - wp.where(kind == SLIDER, ENOUGH_WAY, ENOUGH_TURN))
     trees.turn[nodes + t] = turn + trees.opening[at].turn
     trees.shift[nodes + t] = shift + trees.opening[at].shift
     limit = joints.limit[r] * dt * dt
@@ -143,7 +142,7 @@ def gather_node(rigid: RigidState, joints: Joints, trees: Trees, world: int, n: 
 
 @wp.func
 def move_node(rigid: RigidState, joints: Joints, trees: Trees, passing: Passing, world: int, n: int):
-    """Move a node's body by what its joints bear of the pass, and contacts push."""
+    """Move a node's body by what its joints bear of the pass."""
     k = trees.joint[wp.where(n < trees.count, n, wp.max(trees.heir[n], 0))]
     if goes_on(passing, island_of(passing, world, joints.body[k])):
         i = world * rigid.capacity + slot_of_node(joints, trees, n)
@@ -159,25 +158,17 @@ def project_trees(
     """One pass over all trees of a world; `trees.wrong` tells how far each joint was from where it should be."""
     nodes = world * (trees.count + trees.roots)
     nothing = wp.vec3(0.0, 0.0, 0.0)
-    renewed = int(0)
     for n in range(trees.count + trees.roots):
         trees.stale[nodes + n] = wp.where(k_pass == 0, 1, 0)
-        pushed = trees.pushed[nodes + n]
-        spun = trees.spun[nodes + n]
-        trees.pull[nodes + n] = pushed
-        trees.twist[nodes + n] = spun
-        if n < trees.count:
-            trees.changed[world * trees.count + n] = 0
-            if k_pass == 0:
-                begin_opening(rigid, joints, trees, world, n, dt)
-            note_fit(rigid, joints, trees, world, n)
-            spun = spun - wp.cross(trees.opening[world * trees.count + n].arm, pushed)
-        trees.node[nodes + n].force = -pushed
-        trees.node[nodes + n].torque = -spun
-        trees.pushed[nodes + n] = nothing
-        trees.spun[nodes + n] = nothing
-        trees.ahead[nodes + n] = nothing
-        trees.ahead_turn[nodes + n] = nothing
+        trees.node[nodes + n].force = nothing
+        trees.node[nodes + n].torque = nothing
+        trees.pull[nodes + n] = nothing
+        trees.twist[nodes + n] = nothing
+    for t in range(trees.count):
+        trees.changed[world * trees.count + t] = 0
+        if k_pass == 0:
+            begin_opening(rigid, joints, trees, world, t, dt)
+        note_fit(rigid, joints, trees, world, t)
     for back in range(trees.count):
         t = trees.count - 1 - back
         k = trees.joint[t]
@@ -192,7 +183,6 @@ def project_trees(
                 trees.changed[at] = 1
                 wrong = wp.max(wrong, PIVOTED)
             trees.wrong[at] = wrong
-            renewed = wp.max(renewed, anew)
             if trees.carrier[t] >= 0:
                 n = nodes + trees.carrier[t]
                 if trees.carrier[t] < trees.count:
@@ -214,8 +204,6 @@ def project_trees(
             shift, turn = rest_of(trees.node[at])
         trees.shift[at] = shift
         trees.turn[at] = turn
-    if renewed == 1:
-        renew_replies(rigid, joints, trees, world)
     for t in range(trees.count):
         k = trees.joint[t]
         if goes_on(passing, island_of(passing, world, joints.body[k])):

@@ -10,7 +10,7 @@ import numpy as np
 import warp as wp
 
 from nuno.coupled.articulated_inertia import Inertia
-from nuno.coupled.joint_opening import Fit, Opening, Reply, Trees
+from nuno.coupled.joint_opening import Fit, Opening, Trees
 
 ANCHOR = -1
 """In place of a body: the world, or what is static."""
@@ -103,23 +103,16 @@ def tree_table(pairs: Sequence[tuple[int, int]], worlds: int, device: str) -> Tr
     for k, carrier in enumerate(forest.carriers):
         if carrier >= 0:
             next_heirs[k], heirs[carrier] = heirs[carrier], k
-    ends = [pairs[k][0 if not flip else 1] for k, flip in zip(forest.joints, forest.flipped, strict=True)]
-    node_of = np.full(max([0, *ends, *forest.roots]) + 1, -1)
-    node_of[[*ends, *forest.roots]] = np.arange(len(heirs))
-    table.slots = len(node_of)
     for name, numbers in (
         ("joint", forest.joints), ("carrier", forest.carriers), ("flipped", forest.flipped), ("root", forest.roots),
         ("alone", forest.lone), ("heir", heirs), ("next_heir", next_heirs),
-        ("node_of", node_of),
     ):  # fmt: skip
         setattr(table, name, wp.array(np.array(numbers, np.int32), dtype=int, device=device))
     nodes, joints = worlds * (table.count + table.roots), worlds * table.count
     for name, kind, count in (
         ("opening", Opening, joints), ("fit", Fit, joints), ("node", Inertia, nodes), ("carried", Inertia, joints),
         ("shift", wp.vec3, nodes), ("turn", wp.vec3, nodes), ("pull", wp.vec3, nodes), ("twist", wp.vec3, nodes),
-        ("stale", int, nodes), ("changed", int, joints), ("wrong", float, joints), ("asked", int, nodes),
-        ("reply", Reply, nodes), ("pushed", wp.vec3, nodes), ("spun", wp.vec3, nodes), ("ahead", wp.vec3, nodes),
-        ("ahead_turn", wp.vec3, nodes), ("bore", wp.vec3, joints),
+        ("stale", int, nodes), ("changed", int, joints), ("wrong", float, joints),
     ):  # fmt: skip
         setattr(table, name, wp.zeros(count, dtype=kind, device=device))
     return table
