@@ -18,7 +18,7 @@ class Inertia:
 
 
 @wp.func
-def times_skew(m: wp.mat33, v: wp.vec3):
+def crossed_rows(m: wp.mat33, v: wp.vec3):
     """A matrix times that which crosses v with what it is multiplied by: each of its rows crossed with v."""
     return wp.matrix_from_rows(wp.cross(m[0], v), wp.cross(m[1], v), wp.cross(m[2], v))
 
@@ -28,9 +28,9 @@ def seen_from(own: Inertia, arm: wp.vec3):
     """The inertia of a frame as that of another of the same body, from which ``arm`` leads to it."""
     made = Inertia()
     made.a = own.a
-    made.b = own.b - times_skew(own.a, arm)
+    made.b = own.b - crossed_rows(own.a, arm)
     # s b' - b^T s, with s what crosses the arm
-    made.c = own.c - wp.transpose(times_skew(wp.transpose(made.b), arm)) - times_skew(wp.transpose(own.b), arm)
+    made.c = own.c - wp.transpose(crossed_rows(wp.transpose(made.b), arm)) - crossed_rows(wp.transpose(own.b), arm)
     made.force = own.force
     made.torque = own.torque + wp.cross(arm, own.force)
     return made

@@ -21,7 +21,7 @@ from nuno.rigid.rigid_body import RigidState, fine_turn, point_before
 LIMITED = wp.constant(0.999)
 """Of a joint's limit, from where on it bears no more in the substep."""
 
-ENOUGH_TURN = wp.constant(2.0e-6)
+ENOUGH_ROTATION = wp.constant(2.0e-6)
 """[rad] From which on a joint's turn asks for another pass. Rounding leaves 0.7e-6 of two bodies' turns and their
 products with its frames, and contacts, whose own rounding of 4e-7 m turns a foot by 3e-6, as much again. What a pass
 finds it also mends, but for the square of it, so that what is left is far less. Friction that lets go or takes hold
@@ -37,7 +37,7 @@ class Opening:
     push: wp.vec3  # U of a hinge or slider: a force,
     twist: wp.vec3  # and a torque
     gives: float  # D^-1; 0 where nothing is free
-    ball_gives: wp.mat33  # D^-1 of a ball joint
+    swivel: wp.mat33  # D^-1 of a ball joint
     drive: float  # u
     shift: wp.vec3  # what it takes back of a wrong place, and what it is driven by where that is given,
     turn: wp.vec3  # and of a wrong turn
@@ -57,7 +57,7 @@ class Opening:
 
 @wp.struct
 class Fit:
-    """How far a joint's frames are from each other."""
+    """The frames of a joint against each other."""
 
     apart: wp.vec3  # places that should not be apart, beyond what may stay so in the substep
     off: wp.vec3  # turns that should not be, likewise
@@ -247,7 +247,7 @@ def open_joint(rigid: RigidState, joints: Joints, trees: Trees, world: int, t: i
     place = trees.fit[at].along
     i = world * rigid.capacity + joints.slot[k]
     rounding = ROUNDING * (1.0 + wp.length(rigid.position[i]))
-    wrong = wp.max(wp.max(wp.length(apart) - rounding, wp.length(off) - ENOUGH_TURN), 0.0)
+    wrong = wp.max(wp.max(wp.length(apart) - rounding, wp.length(off) - ENOUGH_ROTATION), 0.0)
     anew = stale
     limit = LIMITED * joints.limit[r] * dt * dt
     if wp.length_sq(joints.pull[r]) > limit * limit or wp.length_sq(joints.twist[r]) > limit * limit:
@@ -261,7 +261,7 @@ def open_joint(rigid: RigidState, joints: Joints, trees: Trees, world: int, t: i
         trees.opening[at].gives = 0.0
         trees.opening[at].push = wp.vec3(0.0, 0.0, 0.0)
         trees.opening[at].twist = wp.vec3(0.0, 0.0, 0.0)
-        trees.opening[at].ball_gives = wp.mat33(0.0)
+        trees.opening[at].swivel = wp.mat33(0.0)
         trees.carried[at] = Inertia()
         return wrong, anew
     if trees.opening[at].alone == 1:
@@ -292,7 +292,7 @@ def open_joint(rigid: RigidState, joints: Joints, trees: Trees, world: int, t: i
         along = wp.dot(axis, force)
         if kind == HINGE:
             along = wp.dot(axis, torque)
-            rounding = ENOUGH_TURN
+            rounding = ENOUGH_ROTATION
         else:
             rounding = ENOUGH_WAY
         old = joints.axial[r]
@@ -336,12 +336,12 @@ def open_joint(rigid: RigidState, joints: Joints, trees: Trees, world: int, t: i
     elif kind == BALL:
         # it turns with nothing: what is carried is a mass at its point
         if anew == 1:
-            ball_gives = inverted(c)
-            trees.opening[at].ball_gives = ball_gives
-            trees.carried[at].a = a - b * ball_gives * wp.transpose(b)
+            swivel = inverted(c)
+            trees.opening[at].swivel = swivel
+            trees.carried[at].a = a - b * swivel * wp.transpose(b)
             trees.carried[at].b = wp.mat33(0.0)
             trees.carried[at].c = wp.mat33(0.0)
-        free_turn = trees.opening[at].ball_gives * -torque
+        free_turn = trees.opening[at].swivel * -torque
         turn = turn + free_turn
         force = force + b * free_turn
         torque = wp.vec3(0.0, 0.0, 0.0)

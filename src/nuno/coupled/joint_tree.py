@@ -27,7 +27,7 @@ import warp as wp
 from nuno.coupled.articulated_inertia import body_inertia, rest_of, seen_from
 from nuno.coupled.drive_constraints import project_ball
 from nuno.coupled.joint_opening import (
-    ENOUGH_TURN,
+    ENOUGH_ROTATION,
     ENOUGH_WAY,
     Trees,
     arms_of,
@@ -68,7 +68,7 @@ def close_joint(rigid: RigidState, joints: Joints, trees: Trees, world: int, t: 
     went = float(0.0)
     if kind == BALL:
         held = shift * trees.node[nodes + t].b + trees.node[nodes + t].c * turn
-        ball_turn = trees.opening[at].ball_gives * -held
+        ball_turn = trees.opening[at].swivel * -held
         went = wp.length(ball_turn)
         turn = turn + ball_turn
     elif kind == HINGE or kind == SLIDER:
@@ -79,7 +79,7 @@ def close_joint(rigid: RigidState, joints: Joints, trees: Trees, world: int, t: 
             turn = turn + (sign * q) * axis
         else:
             shift = shift + (sign * q) * axis
-    trees.wrong[at] = wp.max(trees.wrong[at], went - wp.where(kind == SLIDER, ENOUGH_WAY, ENOUGH_TURN))
+    trees.wrong[at] = wp.max(trees.wrong[at], went - wp.where(kind == SLIDER, ENOUGH_WAY, ENOUGH_ROTATION))
     trees.turn[nodes + t] = turn + trees.opening[at].turn
     trees.shift[nodes + t] = shift + trees.opening[at].shift
     limit = joints.limit[r] * dt * dt
