@@ -49,7 +49,7 @@ nitpick_ignore_regex = [
     ("py:class", r"(.*\.)?(GripSpec|ImageReading|ImaginedRobot|Scene|Schedule|SoftTopology|States|WalkPlanner)"),
     ("py:class", r"(.*\.)?(ContactRules|Formula|Simulation)"),
     # What a narrower type or a protocol says of a public class
-    ("py:class", r"(.*\.)?(EngineWorld|LearntFold|Robot|WalkSettings)"),
+    ("py:class", r"(.*\.)?(EngineWorld|LearntFold|OriginalRobot|Robot|WalkSettings)"),
 ]
 
 
