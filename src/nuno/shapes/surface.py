@@ -131,19 +131,18 @@ def chosen_points(
         given = [where] if isinstance(where, int | np.integer) else where
         indices = index_array("where", given, ("k",), (worlds, "k"), low=-1, high=vertex_count)
         _check_once(indices)
-        if indices.ndim == 1:
-            _check_any(indices)
+        _check_any(indices)
         return np.array(np.broadcast_to(indices, (worlds, indices.shape[-1]))), None, None
     chosen = index_array("where.faces", where.faces, ("k",), (worlds, "k"), low=-1, high=len(faces))
-    if chosen.ndim == 1:
-        _check_any(chosen)
+    _check_any(chosen)
     corners = np.where((chosen >= 0)[..., None], faces[chosen], -1)
     shape = (worlds, *corners.shape[-2:])
     return None, np.array(np.broadcast_to(corners, shape)), np.array(np.broadcast_to(where.barycentric, shape))
 
 
 def _check_any(indices: np.ndarray) -> None:
-    if (indices < 0).all():
+    """Check that indices for all worlds (k,) name a point; of those of each world (worlds, k) none may."""
+    if indices.ndim == 1 and (indices < 0).all():
         raise InvalidInputError("where names no point: -1 is none in a world, not the last vertex")
 
 
