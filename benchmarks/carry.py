@@ -14,8 +14,9 @@ correlation of F over all that succeed in both. `--arms boxes` takes boxes aroun
 device may be on a machine without Pinocchio. `--warm` runs once more, now that all kernels are loaded.
 `--stiffness` instead clamps strips of the soft mat, 0.15 m free, and reads the bending rigidity off their sag: tip drop
 over reach H / W of a strip under its own weight against the elastica's (theta'' = -G (1 - s) cos theta, G = w L^3 / B).
-`--body weight` carries with a whole robot that has dynamics, one trial after the other; `--body kinematic` with the
-same links going where they are sent. Trials are appended to the `--json` file, and it goes on from there.
+`--body weight` carries with a whole robot that has dynamics, `--body kinematic` with the same links going where they
+are sent, one trial after the other or in `--jobs` processes. Trials are appended to the `--json` file, and it goes on
+from there.
 `--compare FILE FILE` says how alike two such files, or one and that of a batch, are.
 """
 
@@ -32,6 +33,7 @@ from concurrent.futures import ProcessPoolExecutor
 from typing import Any
 
 import numpy as np
+from processes import in_processes
 
 import nuno
 from nuno.tasks import carry_mat as carrying
@@ -90,27 +92,31 @@ def plan(arms: str, path: str | None, processes: int) -> tuple[ArmTracks, dict[s
     return tracks, {"wall_s": time.perf_counter() - wall, "busy_s": time.process_time() - busy}
 
 
-def with_body(tracks: ArmTracks, mat: str, body: str, path: pathlib.Path) -> None:
+def with_body(tracks: ArmTracks, mat: str, body: str, path: pathlib.Path, jobs: int) -> None:
     """Carry with a whole robot, and append each trial to a file of JSON lines as it ends."""
-    carried, material = carrying._mat(mat, None)
-    plan = make_plan(tracks, carried, material, hold="support", arm_friction=0.5)
     ways = itertools.product(range(len(tracks.distances)), carrying.OFFSETS_X, carrying.OFFSETS_Y)
-    rows = [(float(tracks.distances[walk]), x, y, walk) for walk, x, y in ways]
     done = {way_of(row) for row in read_lines(path)} if path.exists() else set()
-    robot = nuno.Humanoid(tracks.robot)
-    for distance, x, y, walk in rows:
-        if (round(distance, 4), x, y) in done:
-            continue
-        wall, busy = time.perf_counter(), time.process_time()
-        found = carry_by_robot(
-            robot, plan, walk, np.array([x, y]), dynamics=body == "weight", goal=carrying.WALK
-        )  # fmt: skip
-        said = {name: None if value != value else value for name, value in vars(found).items()}
-        said |= {"arm_distance": distance, "offset_x": x, "offset_y": y, "body": body}
-        said |= {"wall_s": time.perf_counter() - wall, "busy_s": time.process_time() - busy}
+    left = [
+        (tracks, mat, body, walk, x, y)
+        for walk, x, y in ways
+        if (round(float(tracks.distances[walk]), 4), x, y) not in done
+    ]
+    for said in in_processes(trial_with_body, left, jobs):
         print(said, flush=True)
         with path.open("a", encoding="utf-8") as file:
             file.write(json.dumps(said) + "\n")
+
+
+def trial_with_body(tracks: ArmTracks, mat: str, body: str, walk: int, x: float, y: float) -> dict[str, Any]:
+    """Return what came of carrying in one way with a whole robot, and how long it took."""
+    carried, material = carrying._mat(mat, None)
+    plan = make_plan(tracks, carried, material, hold="support", arm_friction=0.5)
+    robot = nuno.Humanoid(tracks.robot)
+    wall, busy = time.perf_counter(), time.process_time()
+    found = carry_by_robot(robot, plan, walk, np.array([x, y]), dynamics=body == "weight", goal=carrying.WALK)
+    said = {name: None if value != value else value for name, value in vars(found).items()}
+    said |= {"arm_distance": float(tracks.distances[walk]), "offset_x": x, "offset_y": y, "body": body}
+    return said | {"wall_s": time.perf_counter() - wall, "busy_s": time.process_time() - busy}
 
 
 def read_lines(path: pathlib.Path) -> list[dict[str, Any]]:
@@ -216,11 +222,12 @@ def main() -> None:
     options.add_argument("--compare-boxes", action="store_true")
     options.add_argument("--warm", action="store_true", help="once more, with all kernels loaded")
     options.add_argument("--processes", type=int, default=0, help="that plan walks; 0 plans them in this one")
+    options.add_argument("--jobs", type=int, default=1, help="processes for --body, each on one core")
     options.add_argument("--plans", help="a file of plans to take")
     options.add_argument("--save-plans", help="a file to write plans to")
     options.add_argument("--plan-only", action="store_true")
     options.add_argument("--stiffness", action="store_true")
-    options.add_argument("--body", choices=("weight", "kinematic"), help="a whole robot, one trial after the other")
+    options.add_argument("--body", choices=("weight", "kinematic"), help="a whole robot, one trial a process")
     options.add_argument("--compare", nargs=2, metavar="FILE", help="two files of trials")
     options.add_argument("--out", help="folder for table and pictures")
     options.add_argument("--json", help="file for the numbers")
@@ -239,7 +246,7 @@ def main() -> None:
         return
     if asked.body:
         path = pathlib.Path(asked.json or f"carry-{asked.body}.jsonl")
-        with_body(tracks.of_walks(slice(None, None, asked.every)), asked.mat, asked.body, path)
+        with_body(tracks.of_walks(slice(None, None, asked.every)), asked.mat, asked.body, path, asked.jobs)
         return
     given: dict[str, Any] = dict(
         robot=tracks.of_walks(slice(None, None, asked.every)), mat=asked.mat, hold=asked.hold, device=asked.device
