@@ -39,6 +39,8 @@ SINKS = 0.15
 """[m/s] At which a foot goes down to ground that is lower than planned."""
 LEGS = 0.01
 """Weight of the posture of legs, of that of other joints."""
+PROXIMITY = 1e-6
+"""Weight of accelerations themselves: what no task asks for stays small."""
 EQUAL = 5
 """DAQP's mark of a constraint that is an equality."""
 
@@ -192,16 +194,16 @@ class WholeBodyControl:
         bias: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
         """Return the motions and torques that miss the tasks least, as `solve` does."""
-        (worlds, n), each = bias.shape, touching.shape[2]
+        n, each = bias.shape[1], touching.shape[2]
         transposed = tasks.swapaxes(1, 2)
         hessians, linears = transposed @ tasks, -(transposed @ wanted[:, :, None])[:, :, 0]
-        is_found, motions, efforts = np.zeros(worlds, dtype=bool), np.zeros((worlds, n)), np.zeros((worlds, n - 6))
-        for w, own in enumerate(bears):
+        hessians += PROXIMITY * np.eye(n)
+        is_found, motions, efforts = self._unbounded(hessians, linears, touching, bears, mass, bias)
+        for w in np.flatnonzero(~is_found).tolist():
+            own = bears[w]
             count = each * int(own.sum())
-            proximity, hessian, linear, constraints, upper, lower, sense = self._program(count)
-            hessian[:n, :n] = proximity + hessians[w]
-            linear[:n] = linears[w]
-            constraints[:n, :n] = mass[w]
+            hessian, linear, constraints, upper, lower, sense = self._program(count)
+            hessian[:n, :n], linear[:n], constraints[:n, :n] = hessians[w], linears[w], mass[w]
             if count:
                 constraints[:n, n:] = -touching[w, own].reshape(3 * count, n).T
             upper[:6] = lower[:6] = -bias[w, :6]
@@ -211,10 +213,41 @@ class WholeBodyControl:
             if flag > 0:
                 is_found[w], motions[w] = True, found[:n]
                 efforts[w] = (constraints[:n] @ found + bias[w])[6:]
+            else:
+                motions[w], efforts[w] = 0.0, 0.0
         return is_found, motions, efforts
 
+    def _unbounded(
+        self, hessians: np.ndarray, linears: np.ndarray, touching: np.ndarray, bears: np.ndarray, mass: np.ndarray,
+        bias: np.ndarray,
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
+        """Return what `_minimised` does where neither friction nor effort limits bind, and where that is.
+
+        What is least under the base's equation alone, and keeps to all limits, is least under all of them. Of the
+        accelerations a, the forces f at the corners and the multipliers y of that equation,
+
+            H a + g + B^T y = 0,    force f = T y,    B a - T^T f = -c
+
+        with B and T the base's columns of the masses and of the corners' motion; so y solves a system of six.
+        """
+        worlds, n = bias.shape
+        corners = np.where(bears[:, :, None, None, None], touching, 0.0).reshape(worlds, -1, n)
+        base = mass[:, :6]
+        found = np.linalg.solve(hessians, np.concatenate([base.swapaxes(1, 2), linears[:, :, None]], axis=2))
+        least, across = found[:, :, 6:], found[:, :, :6]
+        moved = corners[:, :, :6]
+        system = base @ across + moved.swapaxes(1, 2) @ moved / self.gains.force
+        multipliers = np.linalg.solve(system, bias[:, :6, None] - base @ least)
+        motions = -(least + across @ multipliers)
+        forces = moved @ multipliers / self.gains.force
+        borne = mass[:, 6:] @ motions - corners[:, :, 6:].swapaxes(1, 2) @ forces
+        efforts = borne[:, :, 0] + bias[:, 6:]
+        pressed = forces.reshape(worlds, -1, 3) @ self._pyramid.T
+        keeps = (np.abs(efforts) <= self._efforts).all(axis=1) & (pressed <= 0.0).all(axis=(1, 2))
+        return keeps, motions[:, :, 0], efforts
+
     def _program(self, count: int) -> tuple[np.ndarray, ...]:
-        """Return the arrays of the quadratic program with so many points that bear, after what proximity adds to it.
+        """Return the arrays of the quadratic program with so many points that bear.
 
         What is not the same in every frame is filled in anew by whoever asks.
         """
@@ -227,8 +260,7 @@ class WholeBodyControl:
                 constraints[n + 5 * k : n + 5 * k + 5, n + 3 * k : n + 3 * k + 3] = self._pyramid
             upper, lower, sense = np.zeros(rows), np.full(rows, -1e30), np.zeros(rows, dtype=np.int32)
             sense[:6] = EQUAL
-            proximity = 1e-6 * np.eye(n)
-            self._programs[count] = proximity, hessian, np.zeros(columns), constraints, upper, lower, sense
+            self._programs[count] = hessian, np.zeros(columns), constraints, upper, lower, sense
         return self._programs[count]
 
 
