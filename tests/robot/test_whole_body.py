@@ -12,14 +12,14 @@ from nuno.robot.whole_body import WholeBodyControl
 class Programs:
     """Tasks, contacts, masses and forces of some worlds, as ``WholeBodyControl._minimised`` takes them.
 
-    The base's row of tasks is wanted to go in another direction in each world, by up to ``pull`` [m/s2].
+    Every row of the tasks is wanted to go by up to ``pull`` [m/s2].
     """
 
     def __init__(self, robot, worlds, pull):
         rng = np.random.default_rng(0)
         n = robot.model.nv
-        self.tasks = rng.normal(size=(worlds, n + 12, n))
-        self.wanted = rng.uniform(-pull, pull, size=(worlds, n + 12))
+        tasks, wanted = rng.normal(size=(worlds, n + 12, n)), rng.uniform(-pull, pull, size=(worlds, n + 12, 1))
+        self.hessians, self.linears = tasks.swapaxes(1, 2) @ tasks, -(tasks.swapaxes(1, 2) @ wanted)[:, :, 0]
         self.touching = rng.normal(size=(worlds, 2, 4, 3, n))
         half = rng.normal(size=(worlds, n, n))
         self.mass = half @ half.swapaxes(1, 2) + np.eye(n)
@@ -30,7 +30,7 @@ class Programs:
 
     def of(self, rows):
         """Return the arguments in some of the worlds."""
-        parts = self.tasks, self.wanted, self.touching, self.bears, self.mass, self.bias
+        parts = self.hessians, self.linears, self.touching, self.bears, self.mass, self.bias
         return tuple(part[rows] for part in parts)
 
 
