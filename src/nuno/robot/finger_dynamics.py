@@ -113,7 +113,7 @@ class FingerDynamics:
         """
         joints, count = self.joints, len(self.joints)
         carriers: list[Any] = [joint.target for joint in joints]
-        if all(body.is_dynamic for body in carriers):  # read at once, what each would tell
+        if all(joint.active for joint in joints) and all(body.is_dynamic for body in carriers):  # read at once
             places, turns, _, _ = self.world.rigid_motion([*(joint.body for joint in joints), *carriers])
             place, turn, other_place, other_turn = (
                 np.stack([getattr(joint.spec, name) for joint in joints], axis=1)

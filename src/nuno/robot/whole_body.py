@@ -154,10 +154,12 @@ class WholeBodyControl:
         rows = tasks[:, 3:].reshape(worlds, feet, 6, nv)
         arms = _skew(self._corners @ motion.turns.swapaxes(-1, -2))
         touching = rows[:, :, None, :3] - arms @ rows[:, :, None, 3:]  # (worlds, feet, 4, 3, nv)
-        roots, diagonal = np.sqrt(weights[:, self._rows]), np.arange(nv)
+        # taken, not indexed: products of arrays that lie in memory otherwise have other bits in other numbers of worlds
+        roots, goals = (np.take(part, self._rows, axis=1) for part in (np.sqrt(weights), wanted))
+        diagonal = np.arange(nv)
         weighed = roots[:, :, None] * tasks
         hessians = weighed.swapaxes(1, 2) @ weighed
-        linears = -(weighed.swapaxes(1, 2) @ (roots * wanted[:, self._rows])[:, :, None])[:, :, 0]
+        linears = -(weighed.swapaxes(1, 2) @ (roots * goals)[:, :, None])[:, :, 0]
         hessians[:, diagonal, diagonal] += PROXIMITY
         hessians[:, diagonal[3:], diagonal[3:]] += weights[:, 3:nv]
         linears[:, 3:] -= weights[:, 3:nv] * wanted[:, 3:nv]
