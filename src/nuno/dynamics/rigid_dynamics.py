@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-import warp as wp
 
 from nuno.bodies.body_motion import BodyMotion, motion_of_rigid
 from nuno.bodies.body_protocols import WorldSettings
@@ -149,18 +148,12 @@ class RigidScene:
 
     def load(self, saved: dict[tuple[str, str], Any]) -> None:
         """Go back to what `save` returned, in the room that there is now."""
-        solver, longer = self.solver, False
-        for (owner, name), array in saved.items():
-            own = getattr(getattr(solver, owner), name)
-            if own.size == array.size:
-                wp.copy(own, array)
-            else:
-                longer = True
+        longer = self.solver.take_copies(saved)
         self._moving = list(self.static)  # whatever places and velocities they have now
         for place in self.static.values():
             place.where = None
         if longer:
-            solver._list_anew()
+            self.solver._list_anew()
 
     @property
     def origin(self) -> np.ndarray:

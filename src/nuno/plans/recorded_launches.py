@@ -6,7 +6,8 @@ what such a launch is given, structures of arrays, than the launch takes to run.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Hashable, Sequence
+from functools import lru_cache
 from itertools import pairwise
 from typing import Any
 
@@ -54,14 +55,27 @@ class RecordedLaunches:
             threads: Of a world.
             inputs: Its other arguments.
         """
-        parts = min(PARTS * core_count(), worlds // FEWEST) if self._device == "cpu" else 1
-        ends = np.linspace(0, worlds, max(1, parts) + 1).astype(int).tolist()
-        run_together(
-            [
-                self._recording(kernel, threads * (end - first), [*inputs, first], (kernel, first)).launch
-                for first, end in pairwise(ends)
-            ]
-        )
+        run_together([
+            self.launch_of_part(kernel, part, threads, inputs)
+            for part in (parts_of(worlds) if self._device == "cpu" else ((0, worlds),))
+        ])  # fmt: skip
+
+    def launch_of_part(
+        self, kernel: Any, part: tuple[int, int], threads: int, inputs: Sequence[Any], name: Hashable = None
+    ) -> Callable[[], Any]:
+        """Return the launch of a kernel in a part of the worlds, from the first up to another, to be called.
+
+        Args:
+            kernel: See `launch_worlds`.
+            part: The first world, and the first after the part.
+            threads: See `launch_worlds`.
+            inputs: Likewise.
+            name: Tells launches of one kernel apart that take turns with different arguments.
+        """
+        first, end = part
+        launch: Callable[[], Any]
+        launch = self._recording(kernel, threads * (end - first), [*inputs, first], (kernel, first, name)).launch
+        return launch
 
     def launch_parts(
         self, kernel: Any, dim: int, inputs: Sequence[Any], parts: Sequence[int], last: Sequence[Any]
@@ -94,3 +108,10 @@ class RecordedLaunches:
                     command.set_param_at_index(k, value)
         self._recorded[key] = command, list(inputs), dim
         return command
+
+
+@lru_cache(maxsize=64)
+def parts_of(worlds: int) -> tuple[tuple[int, int], ...]:
+    """Return the parts that worlds are cut into on the CPU: of each the first world, and the first after it."""
+    parts = max(1, min(PARTS * core_count(), worlds // FEWEST))
+    return tuple(pairwise(np.linspace(0, worlds, parts + 1).astype(int).tolist()))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.joints.joint import set_motors
+from nuno.joints.joint_motion import positions_of
 from nuno.materials import Rigid
 from nuno.shapes import quaternion as quat
 from nuno.world.make_joints import slider
@@ -110,7 +111,18 @@ class FingerDynamics:
 
         The same of all of one hand, their mean.
         """
-        now = np.stack([np.broadcast_to(joint.position, (self.world.world_count,)) for joint in self.joints], axis=1)
+        joints, count = self.joints, len(self.joints)
+        carriers: list[Any] = [joint.target for joint in joints]
+        if all(joint.active for joint in joints) and all(body.is_dynamic for body in carriers):  # read at once
+            places, turns, _, _ = self.world.rigid_motion([*(joint.body for joint in joints), *carriers])
+            place, turn, other_place, other_turn = (
+                np.stack([getattr(joint.spec, name) for joint in joints], axis=1)
+                for name in ("place", "turn", "other_place", "other_turn")
+            )
+            own, other = (places[:, :count], turns[:, :count]), (places[:, count:], turns[:, count:])
+            now = positions_of(True, _frames(own, place, turn), _frames(other, other_place, other_turn))
+        else:
+            now = np.stack([np.broadcast_to(joint.position, (self.world.world_count,)) for joint in joints], axis=1)
         hands = np.array([[a.hand == b.hand for b in self.fingers] for a in self.fingers], dtype=float)
         return np.asarray(now @ hands / hands.sum(axis=0))
 
@@ -149,3 +161,10 @@ class FingerDynamics:
         made.joints = tuple(joints[joint.key] for joint in self.joints)
         made.forces, made.closed = dict(self.forces), dict(self.closed)
         return made
+
+
+def _frames(
+    pose: tuple[np.ndarray, np.ndarray], place: np.ndarray, turn: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Return frames in bodies, (worlds, k, 3 or 4) each, in the world's frame."""
+    return pose[0] + quat.rotate(pose[1], place), quat.multiply(pose[1], turn)

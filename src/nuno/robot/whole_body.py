@@ -39,6 +39,8 @@ SINKS = 0.15
 """[m/s] At which a foot goes down to ground that is lower than planned."""
 LEGS = 0.01
 """Weight of the posture of legs, of that of other joints."""
+PROXIMITY = 1e-6
+"""Weight of accelerations themselves: what no task asks for stays small."""
 EQUAL = 5
 """DAQP's mark of a constraint that is an equality."""
 
@@ -97,10 +99,9 @@ class WholeBodyControl:
         # feet and trunk say all of where a leg of six joints is
         self._share = np.array([LEGS if n + 2 in of_legs else 1.0 for n in range(len(limits))])
         nv = robot.model.nv
-        # what of the tasks is the same in every frame: trunk and posture are the velocities themselves
-        self._tasks = np.zeros((nv + 6 * len(self._feet), nv))
-        self._tasks[3:6, 3:6], self._tasks[6:nv, 6:] = np.eye(3), np.eye(nv - 6)
-        self._weights = np.full(len(self._tasks), self.gains.foot)
+        # of what is wanted, the centre of mass, then trunk and posture, which are velocities themselves, and the feet
+        self._weights = np.full(nv + 6 * len(self._feet), self.gains.foot)
+        self._rows = np.r_[:3, nv : len(self._weights)]  # whose Jacobians are no rows of the identity
         self._weights[:3], self._weights[3:6] = self.gains.centre, self.gains.trunk
         self._weights[6:nv] = self.gains.posture * self._share
         self._below = np.tril_indices(nv, -1)
@@ -129,14 +130,13 @@ class WholeBodyControl:
             (worlds, n).
         """
         gains, worlds, nv, feet = self.gains, len(now), self._model.nv, len(self._feet)
-        tasks = np.empty((worlds, *self._tasks.shape))
-        tasks[:] = self._tasks
+        tasks = np.empty((worlds, 3 + 6 * feet, nv))
         errors, mass, bias = np.empty((worlds, nv)), np.empty((worlds, nv, nv)), np.empty((worlds, nv))
         for w, state in enumerate(now):
             self._linearised(state, aims.q[w], tasks[w], mass[w], bias[w], errors[w])
         mass[:, self._below[0], self._below[1]] = mass[:, self._below[1], self._below[0]]
         v, free = np.array([state.v for state in now]), aims.falls_freely
-        wanted = np.empty(tasks.shape[:2])
+        wanted = np.empty((worlds, len(self._weights)))
         pull = _back(gains.centre_rate, *(aims.centres[:, :2] - motion.centres[:, :2]).swapaxes(0, 1))
         pull[free, :2] = 0.0
         wanted[:, :3] = aims.centres[:, 2] + pull - motion.centres[:, 2]
@@ -151,22 +151,30 @@ class WholeBodyControl:
         weights[free, :2] = gains.catch
         swings = free[:, None] & ~aims.feet.bears
         weights[:, nv:][np.repeat(swings, 6, axis=1)] = gains.swing
-        rows = tasks[:, nv:].reshape(worlds, feet, 6, nv)
+        rows = tasks[:, 3:].reshape(worlds, feet, 6, nv)
         arms = _skew(self._corners @ motion.turns.swapaxes(-1, -2))
         touching = rows[:, :, None, :3] - arms @ rows[:, :, None, 3:]  # (worlds, feet, 4, 3, nv)
-        roots = np.sqrt(weights)
-        return self._minimised(roots[:, :, None] * tasks, roots * wanted, touching, aims.feet.bears, mass, bias)
+        # taken, not indexed: products of arrays that lie in memory otherwise have other bits in other numbers of worlds
+        roots, goals = (np.take(part, self._rows, axis=1) for part in (np.sqrt(weights), wanted))
+        diagonal = np.arange(nv)
+        weighed = roots[:, :, None] * tasks
+        hessians = weighed.swapaxes(1, 2) @ weighed
+        linears = -(weighed.swapaxes(1, 2) @ (roots * goals)[:, :, None])[:, :, 0]
+        hessians[:, diagonal, diagonal] += PROXIMITY
+        hessians[:, diagonal[3:], diagonal[3:]] += weights[:, 3:nv]
+        linears[:, 3:] -= weights[:, 3:nv] * wanted[:, 3:nv]
+        return self._minimised(hessians, linears, touching, aims.feet.bears, mass, bias)
 
     def _linearised(
         self, now: RobotState, q: np.ndarray, tasks: np.ndarray, mass: np.ndarray, bias: np.ndarray, error: np.ndarray
     ) -> None:
         """Fill in rows of the tasks of one world, its masses (upper triangle), forces at rest, and how far q is."""
-        model, data, nv = self._model, self._data, self._model.nv
+        model, data = self._model, self._data
         tasks[:3] = pin.jacobianCenterOfMass(model, data, now.q)
         mass[:] = pin.crba(model, data, now.q, pin.Convention.WORLD)
         for k, foot in enumerate(self._feet):
             pin.updateFramePlacement(model, data, foot)
-            tasks[nv + 6 * k : nv + 6 * k + 6] = pin.getFrameJacobian(model, data, foot, WORLD_AXES)
+            tasks[3 + 6 * k : 9 + 6 * k] = pin.getFrameJacobian(model, data, foot, WORLD_AXES)
         forced = () if now.loads is None else (pin.StdVec_Force([pin.Force(own) for own in now.loads]),)
         bias[:] = pin.rnea(model, data, now.q, now.v, self._nothing, *forced)
         error[:] = pin.difference(model, now.q, q)
@@ -188,20 +196,17 @@ class WholeBodyControl:
         return np.where(feet.bears[:, :, None], stand, swing) - motion.accelerations
 
     def _minimised(
-        self, tasks: np.ndarray, wanted: np.ndarray, touching: np.ndarray, bears: np.ndarray, mass: np.ndarray,
+        self, hessians: np.ndarray, linears: np.ndarray, touching: np.ndarray, bears: np.ndarray, mass: np.ndarray,
         bias: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
         """Return the motions and torques that miss the tasks least, as `solve` does."""
-        (worlds, n), each = bias.shape, touching.shape[2]
-        transposed = tasks.swapaxes(1, 2)
-        hessians, linears = transposed @ tasks, -(transposed @ wanted[:, :, None])[:, :, 0]
-        is_found, motions, efforts = np.zeros(worlds, dtype=bool), np.zeros((worlds, n)), np.zeros((worlds, n - 6))
-        for w, own in enumerate(bears):
+        n, each = bias.shape[1], touching.shape[2]
+        is_found, motions, efforts = self._unbounded(hessians, linears, touching, bears, mass, bias)
+        for w in np.flatnonzero(~is_found).tolist():
+            own = bears[w]
             count = each * int(own.sum())
-            proximity, hessian, linear, constraints, upper, lower, sense = self._program(count)
-            hessian[:n, :n] = proximity + hessians[w]
-            linear[:n] = linears[w]
-            constraints[:n, :n] = mass[w]
+            hessian, linear, constraints, upper, lower, sense = self._program(count)
+            hessian[:n, :n], linear[:n], constraints[:n, :n] = hessians[w], linears[w], mass[w]
             if count:
                 constraints[:n, n:] = -touching[w, own].reshape(3 * count, n).T
             upper[:6] = lower[:6] = -bias[w, :6]
@@ -211,10 +216,41 @@ class WholeBodyControl:
             if flag > 0:
                 is_found[w], motions[w] = True, found[:n]
                 efforts[w] = (constraints[:n] @ found + bias[w])[6:]
+            else:
+                motions[w], efforts[w] = 0.0, 0.0
         return is_found, motions, efforts
 
+    def _unbounded(
+        self, hessians: np.ndarray, linears: np.ndarray, touching: np.ndarray, bears: np.ndarray, mass: np.ndarray,
+        bias: np.ndarray,
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
+        """Return what `_minimised` does where neither friction nor effort limits bind, and where that is.
+
+        What is least under the base's equation alone, and keeps to all limits, is least under all of them. Of the
+        accelerations a, the forces f at the corners and the multipliers y of that equation,
+
+            H a + g + B^T y = 0,    force f = T y,    B a - T^T f = -c
+
+        with B and T the base's columns of the masses and of the corners' motion; so y solves a system of six.
+        """
+        worlds, n = bias.shape
+        corners = np.where(bears[:, :, None, None, None], touching, 0.0).reshape(worlds, -1, n)
+        base = mass[:, :6]
+        found = np.linalg.solve(hessians, np.concatenate([base.swapaxes(1, 2), linears[:, :, None]], axis=2))
+        least, across = found[:, :, 6:], found[:, :, :6]
+        moved = corners[:, :, :6]
+        system = base @ across + moved.swapaxes(1, 2) @ moved / self.gains.force
+        multipliers = np.linalg.solve(system, bias[:, :6, None] - base @ least)
+        motions = -(least + across @ multipliers)
+        forces = moved @ multipliers / self.gains.force
+        borne = mass[:, 6:] @ motions - corners[:, :, 6:].swapaxes(1, 2) @ forces
+        efforts = borne[:, :, 0] + bias[:, 6:]
+        pressed = forces.reshape(worlds, -1, 3) @ self._pyramid.T
+        keeps = (np.abs(efforts) <= self._efforts).all(axis=1) & (pressed <= 0.0).all(axis=(1, 2))
+        return keeps, motions[:, :, 0], efforts
+
     def _program(self, count: int) -> tuple[np.ndarray, ...]:
-        """Return the arrays of the quadratic program with so many points that bear, after what proximity adds to it.
+        """Return the arrays of the quadratic program with so many points that bear.
 
         What is not the same in every frame is filled in anew by whoever asks.
         """
@@ -227,8 +263,7 @@ class WholeBodyControl:
                 constraints[n + 5 * k : n + 5 * k + 5, n + 3 * k : n + 3 * k + 3] = self._pyramid
             upper, lower, sense = np.zeros(rows), np.full(rows, -1e30), np.zeros(rows, dtype=np.int32)
             sense[:6] = EQUAL
-            proximity = 1e-6 * np.eye(n)
-            self._programs[count] = proximity, hessian, np.zeros(columns), constraints, upper, lower, sense
+            self._programs[count] = hessian, np.zeros(columns), constraints, upper, lower, sense
         return self._programs[count]
 
 

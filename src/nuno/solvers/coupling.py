@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,7 @@ from nuno.rigid.persistent_manifolds import Contacts
 from nuno.rigid.rigid_body import RigidState
 from nuno.solvers.coupling_results import CouplingResults
 from nuno.solvers.particle_solver import ParticleSolver
+from nuno.solvers.rigid_parts import RigidParts
 from nuno.solvers.shape_impulses import plain
 from nuno.state.cloth_state import PARTICLE_ARRAYS, PLACES
 
@@ -69,29 +71,20 @@ class Coupling(CouplingResults):
     """
 
     def __init__(
-        self,
-        solvers: Sequence[ParticleSolver],
-        rigid: Any,
-        slots: Sequence[int],
-        elements: Elements,
-        ties: Ties,
-        holds: Holds,
-        joints: Joints,
-        trees: Trees,
-    ) -> None:
+        self, solvers: Sequence[ParticleSolver], rigid: Any, slots: Sequence[int], elements: Elements, ties: Ties,
+        holds: Holds, joints: Joints, trees: Trees,
+    ) -> None:  # fmt: skip
         self._solvers, self._rigid, self._slots = list(solvers), rigid, list(slots)
-        self._elements, self._ties, self.holds, self.joints = elements, ties, holds, joints
-        self._trees = trees
-        self._scale = self._rate = 0.0
-        self._row_count = 0
+        self._elements, self._ties, self.holds, self.joints, self._trees = elements, ties, holds, joints, trees
+        self._scale, self._rate, self._row_count = 0.0, 0.0, 0
         first = rigid if rigid is not None else solvers[0]
         self.device, self.world_count = str(first.device), int(first.world_count)
         self._threads = BLOCK_THREADS if self.device.startswith("cuda") else 1
         self._at_once = solves_at_once(self.device)
         self._launches = RecordedLaunches(self.device, BLOCK_THREADS)
+        self._parts = RigidParts(self._launches)
         self._state = RigidState() if rigid is None else rigid.state
-        self._bodies = int(elements.bodies)
-        self._island = np.zeros((0, 0), dtype=int)
+        self._bodies, self._island = int(elements.bodies), np.zeros((0, 0), dtype=int)
         self._passing = Passing()
         for name, kind in (("wrong", float), ("done", int), ("linked", int)):
             setattr(self._passing, name, wp.zeros(self.world_count * self._bodies, dtype=kind, device=self.device))
@@ -105,8 +98,7 @@ class Coupling(CouplingResults):
         self._particles = self._room(total)
         self._particles.held = wp.array(held_slots(numbers.size, holds, joints), dtype=int, device=self.device)
         self._start = wp.zeros(max(1, self.world_count * total), dtype=wp.vec3, device=self.device)
-        self._cells = np.full(self._bodies, np.inf)
-        self._cells[: len(self._solvers)] = [solver.cell_size for solver in self._solvers]
+        self._cells = np.array([s.cell_size for s in solvers] + [np.inf] * (self._bodies - len(self._solvers)))
         self._radii = elements.radius.numpy().reshape(self.world_count, self._bodies).T.astype(float)
         self._touches_itself = elements.touch.numpy()[:: self._bodies + 1][: self._bodies] != 0
         tied = set(ties.body.numpy()[: ties.count].tolist())
@@ -232,6 +224,10 @@ class Coupling(CouplingResults):
             self.joints.state.fill_(UNDECIDED)
         self._rate = 1.0 / (dt * dt)
         self._scale = self._rate / substeps
+        if not (self._solvers or self._at_once):
+            joined = partial(self._joined, dt) if self._ties.count or self.holds.count or self.joints.count else None
+            self._parts.run_frame(self._rigid, dt, substeps, joined, partial(self._touching, dt))
+            return
         # what diverges is told of after the run
         speeds = np.nan_to_num(self._speeds(), nan=FAST, posinf=FAST)
         reaches = 2.0 * (QUICKER * np.minimum(speeds, FAST) + 10.0 * duration + 0.1) * dt
@@ -248,8 +244,7 @@ class Coupling(CouplingResults):
                 self._rigid.predict()
             self._touch(k, dt, (k + 1) / substeps)
             if self.joints.count or not (self._at_once or self._rigid is None):
-                last: list[Any] = [self._state, *self._manifolds(), self.joints, self._passing, dt, self._threads]
-                self._launches.launch_worlds(end_contacts, self.world_count, self._threads, last)
+                self._launches.launch_worlds(end_contacts, self.world_count, self._threads, self._touching(dt))
             elif self._rigid is not None:
                 self._rigid.contacts()
             for solver in self._solvers:
@@ -327,11 +322,7 @@ class Coupling(CouplingResults):
                         dt, body=body,
                     )  # fmt: skip
         if self._row_count or self._ties.count or self.holds.count or self.joints.count:
-            self._launches.launch_worlds(solve, worlds, self._threads, [
-                particles, self._state, *self._manifolds(), rows, self._ties, self.holds, self.joints, self._trees,
-                self._passing, self._multipliers, dt, fraction, PASSES_AT_ONCE if self._at_once else PASSES,
-                int(self._at_once), self._threads,
-            ])  # fmt: skip
+            self._launches.launch_worlds(solve, worlds, self._threads, self._joined(dt, fraction))
             if self._row_count:
                 self._go(add_impulses, (worlds, self._row_count), rows, self._bodies, self._impulses)
             for solver, layout in zip(self._solvers, self._layouts, strict=True):
@@ -341,6 +332,18 @@ class Coupling(CouplingResults):
                 self._go(scatter, (worlds, layout.particles), layout, particles, self._start, body=body)
         else:
             self._passing.linked.zero_()
+
+    def _joined(self, dt: float, fraction: float) -> list[Any]:
+        """Return what `solve` takes where so much of the frame is over."""
+        return [
+            self._particles, self._state, *self._manifolds(), self._rows, self._ties, self.holds, self.joints,
+            self._trees, self._passing, self._multipliers, dt, fraction, PASSES_AT_ONCE if self._at_once else PASSES,
+            int(self._at_once), self._threads,
+        ]  # fmt: skip
+
+    def _touching(self, dt: float) -> list[Any]:
+        """Return what `end_contacts` takes."""
+        return [self._state, *self._manifolds(), self.joints, self._passing, dt, self._threads]
 
     def _manifolds(self) -> tuple[Parts, Contacts]:
         """The rigid bodies' contacts with each other, which may be in new arrays since the last substep."""

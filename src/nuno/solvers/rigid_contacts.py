@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import warp as wp
@@ -11,6 +12,10 @@ from nuno.rigid.manifold import POINTS
 from nuno.rigid.rigid_arrays import SAVED, RigidArrays
 from nuno.rigid.saved_contacts import LASTING, LISTING
 from nuno.shapes.quaternion import rotate
+
+WHOLE = ("partner", "count")
+"""Arrays of the manifolds that say which places for pairs are taken, and have points."""
+TAKEN = "taken places"
 
 
 class RigidContacts(RigidArrays):
@@ -76,7 +81,7 @@ class RigidContacts(RigidArrays):
         One is left out if it bounced away and another took its place in the row and pressed, all within the frame.
         """
         impulse, met = self._entries("impulse"), self._entries("met")
-        rows = np.unique(np.flatnonzero(impulse) // 3)
+        rows = np.unique(np.flatnonzero(impulse != 0.0) // 3)  # of bools in a twentieth of the time
         world, part, _ = np.unravel_index(rows, met.shape)
         pairs = np.stack([self.table.parts.slot.numpy()[part], met.ravel()[rows]], axis=1)
         # each gives the one and takes from the other, in the order of worlds, parts and rows
@@ -93,14 +98,21 @@ class RigidContacts(RigidArrays):
             found.setdefault(one, {})[other] = total
         return found
 
-    def copies(self, into: Mapping[tuple[str, str], wp.array]) -> dict[tuple[str, str], wp.array]:
-        """Return copies of all that the next step depends on, by whose it is and its name.
+    def copies(self, into: Mapping[tuple[str, str], Any]) -> dict[tuple[str, str], Any]:
+        """Return copies of all that the next step depends on, by whose it is and its name, for `take_copies`.
+
+        Of the places for pairs, of which few are taken, the CPU copies those.
 
         Args:
             into: Copies of before that are not needed any more, or none: new memory takes longer than the copy.
         """
-        made = {}
-        for owner, names in (("state", SAVED), ("manifolds", (*LASTING, *LISTING))):
+        made: dict[tuple[str, str], Any] = {}
+        lasting = LASTING
+        if self.device == "cpu":
+            lasting = WHOLE
+            taken = np.flatnonzero(self.manifolds.partner.numpy() >= 0)
+            made["manifolds", TAKEN] = taken, {name: self._places(name)[taken] for name in LASTING if name not in WHOLE}
+        for owner, names in (("state", SAVED), ("manifolds", (*lasting, *LISTING))):
             for name in names:
                 own, there = getattr(getattr(self, owner), name), into.get((owner, name))
                 if there is None or there.size != own.size:
@@ -109,6 +121,28 @@ class RigidContacts(RigidArrays):
                     wp.copy(there, own)
                     made[owner, name] = there
         return made
+
+    def take_copies(self, copies: Mapping[tuple[str, str], Any]) -> bool:
+        """Write back what `copies` returned; return whether there is other room now, for which none of it fits."""
+        fits = True
+        partners = copies["manifolds", "partner"].size
+        for (owner, name), array in copies.items():
+            if name == TAKEN:
+                taken, values = array
+                for each, rows in values.items() if self.manifolds.partner.size == partners else ():
+                    self._places(each)[taken] = rows
+                continue
+            own = getattr(getattr(self, owner), name)
+            if own.size == array.size:
+                wp.copy(own, array)
+            else:
+                fits = False
+        return not fits
+
+    def _places(self, name: str) -> np.ndarray:
+        """Return an array of the manifolds on the CPU, (worlds * parts * row, ...)."""
+        whole: np.ndarray = getattr(self.manifolds, name).numpy()
+        return whole.reshape(self.manifolds.partner.size, -1)
 
     def contact_count(self) -> np.ndarray:
         """(worlds,) int: points at which bodies press on each other."""

@@ -60,16 +60,9 @@ class RigidSolver(RigidContacts):
     """
 
     def __init__(
-        self,
-        world_count: int = 1,
-        *,
-        device: str = "cpu",
-        gravity: Sequence[float] = (0.0, 0.0, -9.81),
-        frame_rate: float = 60.0,
-        substeps: int | None = None,
-        origin: ArrayLike = (0.0, 0.0, 0.0),
-        parts: int = PARTS,
-    ) -> None:
+        self, world_count: int = 1, *, device: str = "cpu", gravity: Sequence[float] = (0.0, 0.0, -9.81),
+        frame_rate: float = 60.0, substeps: int | None = None, origin: ArrayLike = (0.0, 0.0, 0.0), parts: int = PARTS,
+    ) -> None:  # fmt: skip
         super().__init__(int(world_count), str(device), parts)
         self.frame_rate = float(frame_rate)
         self.gravity = np.asarray(gravity, dtype=float)
@@ -278,6 +271,7 @@ class RigidSolver(RigidContacts):
 
     def open(self, time: float, dt: float, members: Sequence[int] | None = None) -> None:
         """Begin substeps of ``dt`` [s] whose phases are called one by one: predict, contacts, finish."""
+        self._load_contacts()
         self._choose(members)
         self._dt, self._opened = float(dt), True
 
@@ -302,27 +296,41 @@ class RigidSolver(RigidContacts):
 
     def _launch(self, phase: str, dt: float, substeps: int, frame: int = 0) -> None:
         self._load_contacts()
-        run = self.settings
-        run.frame = frame
-        run.dt, run.gravity, run.passes = dt, wp.vec3(*self.gravity), self.passes
-        run.down = float(np.linalg.norm(self.gravity))
+        self.write_settings(self.settings, dt, frame)
         threads = BLOCK_THREADS if self._cuda else 1
-        counts = self.manifolds.counts.numpy().reshape(-1, COUNTS)
+        counts = self.counts()
         counts[:, LEFT] = substeps
         while True:
             counts[:, OVERFLOW] = 0
             if self._cuda:  # else they are a view
                 self.manifolds.counts.assign(counts.ravel())
-            inputs = [self.state, self.table.parts, self.manifolds, self.rules, run, PHASES[phase]]
+            inputs = [self.state, self.table.parts, self.manifolds, self.rules, self.settings, PHASES[phase]]
             if not self._launch_block_groups(inputs):
                 self._launches.launch_worlds(run_rigid, self.world_count, threads, [*inputs, threads])
-            counts = self.manifolds.counts.numpy().reshape(-1, COUNTS)
-            if not counts[:, OVERFLOW].any():
+            if not self.counts()[:, OVERFLOW].any():
                 return
-            left = counts[:, LEFT].copy()
-            self._lengthen_rows()
-            counts = self.manifolds.counts.numpy().reshape(-1, COUNTS)
-            counts[:, LEFT] = left
+            self.make_room()
+            counts = self.counts()
+
+    def write_settings(self, run: RigidSettings, dt: float, frame: int) -> None:
+        """Write the settings of a run of substeps of ``dt`` [s]; ``frame`` are left of it as its last frame begins."""
+        run.frame = frame
+        run.dt, run.gravity, run.passes = dt, wp.vec3(*self.gravity), self.passes
+        run.down = float(np.linalg.norm(self.gravity))
+
+    def counts(self) -> np.ndarray:
+        """(worlds, COUNTS) int; on the CPU they are the solver's own."""
+        counts: np.ndarray = self.manifolds.counts.numpy().reshape(-1, COUNTS)
+        return counts
+
+    def make_room(self) -> None:
+        """Make longer rows; worlds in which one was too short have still to go on."""
+        before = self.counts()
+        self._lengthen_rows()
+        counts = self.counts()
+        counts[:, LEFT], counts[:, OVERFLOW] = before[:, LEFT], before[:, OVERFLOW]
+        if self._cuda:
+            self.manifolds.counts.assign(counts.ravel())
 
     def _blocks_of_group(self) -> int:
         """Blocks of a block group that takes a world, one to 32 parts; 1 where a block by itself is quicker."""

@@ -42,7 +42,10 @@ class Islands:
         return np.where(self.substeps == substeps, self.first, np.arange(len(self.first))[:, None])
 
 
-def find_islands(world: Simulation, moving: list[Body], duration: float, substeps: np.ndarray | None = None) -> Islands:
+def find_islands(
+    world: Simulation, moving: list[Body], duration: float, substeps: np.ndarray | None = None,
+    known: dict[tuple[str, str], bool] | None = None,
+) -> Islands:  # fmt: skip
     """Return the islands of dynamic bodies for the next ``duration`` [s], at most a frame.
 
     Args:
@@ -50,7 +53,9 @@ def find_islands(world: Simulation, moving: list[Body], duration: float, substep
         moving: The bodies.
         duration: [s].
         substeps: (bodies, worlds) int, how many of a frame each needs; None takes the bodies' own.
+        known: Whether pairs of bodies touch each other at all, by their keys; what is found is added.
     """
+    known = {} if known is None else known
     joined = np.zeros((len(moving), len(moving), world.world_count), dtype=bool)
     near = joined
     if len(moving) > 1:
@@ -59,8 +64,12 @@ def find_islands(world: Simulation, moving: list[Body], duration: float, substep
         for axis in (1, 2):
             below &= low[axis][:, None] <= high[axis]
         near = below & below.swapaxes(0, 1)
-    for a, b in np.argwhere(np.triu(near.any(axis=-1), 1)):
-        if world._rules.touch(moving[a], moving[b]):
+    keys = [body.key for body in moving]
+    for a, b in np.argwhere(np.triu(near.any(axis=-1), 1)).tolist():
+        touch = known.get((keys[a], keys[b]))
+        if touch is None:
+            touch = known[keys[a], keys[b]] = world._rules.touch(moving[a], moving[b])
+        if touch:
             joined[a, b] = near[a, b]
     place = {body: k for k, body in enumerate(moving)}
     for body in moving:

@@ -39,6 +39,7 @@ class Stepping:
         self._world = world
         self._couplings: dict[Any, Any] = {}
         self._version = -1
+        self._touch: dict[tuple[str, str], bool] = {}  # of pairs that came near each other since bodies last changed
         self.last: list[Any] = []  # the couplings of the last frame, for the forces that they tell
         self.careful = False  # whether a cloth may be so fast that it passes through itself: see `nuno.world.impacts`
 
@@ -55,6 +56,7 @@ class Stepping:
             world._bring_rigid()
         if self._version != world._collider_version:
             self._couplings.clear()
+            self._touch.clear()
             self._version = world._collider_version
         self.last = []
         apart = not self._may_touch(moving, rigid) and not (rigid and world._kinematic_bodies())
@@ -117,7 +119,7 @@ class Stepping:
     def _run_frame(self, moving: list[Body], time: float, duration: float) -> None:
         world = self._world
         impacts = Impacts(moving, world.world_count, 1.0 / world.frame_rate) if self.careful else None
-        islands = find_islands(world, moving, duration, None if impacts is None else impacts.substeps)
+        islands = find_islands(world, moving, duration, None if impacts is None else impacts.substeps, self._touch)
         several = [self.careful or bool(np.ptp(own)) for own in islands.substeps]
         runs = FrameRuns(world, [body for body, more in zip(moving, several, strict=True) if more])
         due = np.ones_like(islands.substeps, dtype=bool)
