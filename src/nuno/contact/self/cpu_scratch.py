@@ -18,13 +18,13 @@ int *tame = (int*)(along_z + row), *uncreased = tame + row;
 float* ball = (float*)(uncreased + row);
 int* corner = (int*)(ball + 4 * faces);
 float* rod = (float*)(corner + 3 * faces);
-int* end = (int*)(rod + 4 * edges);
+int* end = (int*)(rod + 6 * edges);
 float* box = (float*)(end + 2 * edges);
 float* group = box + 6 * boxes;
 float* near_ball = group + 6 * groups;
 int *near_corner = (int*)(near_ball + 4 * faces), *near_face = near_corner + 3 * faces;
 float* near_rod = (float*)(near_face + faces);
-int *near_end = (int*)(near_rod + 4 * edges), *near_edge = near_end + 2 * edges;
+int *near_end = (int*)(near_rod + 6 * edges), *near_edge = near_end + 2 * edges;
 """
 
 
@@ -32,7 +32,7 @@ def listing_room(points: int, faces: int, edges: int, leaves: int) -> int:
     """Return how many numbers the scratch room of `list_world` has."""
     whole = [-(-count // 16) * 16 for count in (faces, edges, leaves)]
     groups = -(-whole[2] // 256) * 16
-    return 4 * points + 5 * (points + 32) + 15 * (whole[0] + 16) + 13 * (whole[1] + 16) + 6 * whole[2] + 6 * groups
+    return 4 * points + 5 * (points + 32) + 15 * (whole[0] + 16) + 17 * (whole[1] + 16) + 6 * whole[2] + 6 * groups
 
 
 @wp.func_native(
@@ -96,7 +96,9 @@ for (int j = 0; j < E; j += 16) {
     *(V*)(rod + j) = x + dx;
     *(V*)(rod + edges + j) = y + dy;
     *(V*)(rod + 2 * edges + j) = z + dz;
-    *(V*)(rod + 3 * edges + j) = __builtin_elementwise_sqrt(dx * dx + dy * dy + dz * dz);
+    *(V*)(rod + 3 * edges + j) = dx;
+    *(V*)(rod + 4 * edges + j) = dy;
+    *(V*)(rod + 5 * edges + j) = dz;
 }
 for (int b = 0; b < boxes; ++b) {
     // beyond the last leaf stand boxes that meet nothing

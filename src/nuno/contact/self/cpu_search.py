@@ -65,6 +65,15 @@ auto safe = [&](int a, int start) ALONE {
     const I at = smaller(low, points / columns - FLAT_SIDE) * columns + smaller(left, columns - FLAT_SIDE);
     return bits((right - left < FLAT_SIDE) & (high - low < FLAT_SIDE) & take_int(tame, at));
 };
+// the edges whose boxes meet a box
+auto meet = [&](const float* rows, int count, int k, const float* low, const float* high) {
+    V gap = (V){} + 1e30f;
+    for (int c = 0; c < 3; ++c) {
+        const V x = *(const V*)(rows + c * count + k), half = *(const V*)(rows + (c + 3) * count + k);
+        gap = minimum(gap, minimum(x - low[c], high[c] - x) + maximum(half, -half));
+    }
+    return gap > 0.f;
+};
 int* counted[2] = {(int*)pair_count, (int*)pair_count + lanes};
 for (int c = 0; c < 2; ++c) {
     int* max_counted = counted[c] + MAX_NEIGHBOURS * lanes;
@@ -123,9 +132,9 @@ for (int a = 0; a < leaves; ++a) {
         }
         const int begin = edge_start[first[r]];
         for (int j = begin > edge_start[a] ? begin : edge_start[a]; j < edge_stop; j += 16) {
-            const unsigned some = bits(reach(rod, edges, j, low, high) & (OWN + j < edge_stop));
+            const unsigned some = bits(meet(rod, edges, j, low, high) & (OWN + j < edge_stop));
             if (some == 0) continue;
-            ROLLED for (int c = 0; c < 4; ++c)
+            ROLLED for (int c = 0; c < 6; ++c)
                 pack((int*)near_rod + c * edges, edge_count, *(const I*)(rod + c * edges + j), some);
             ROLLED for (int c = 0; c < 2; ++c)
                 pack(near_end + c * edges, edge_count, *(const I*)(end + c * edges + j), some);
@@ -152,11 +161,18 @@ for (int a = 0; a < leaves; ++a) {
         }
     }
     for (int k = edge_start[a]; k < edge_start[a + 1]; ++k) {
-        const float x = rod[k], y = rod[edges + k], z = rod[2 * edges + k], rod_reach = rod[3 * edges + k] + far;
+        const float x = rod[k], y = rod[edges + k], z = rod[2 * edges + k];
+        const float ax = rod[3 * edges + k], ay = rod[4 * edges + k], az = rod[5 * edges + k];
         const int p = end[k], q = end[edges + k];
         for (int j = 0; j < edge_count; j += 16) {
             const I other = *(const I*)(near_edge + j);
-            I near = within(near_rod, edges, j, x, y, z, rod_reach) & (OWN + j < edge_count) & (other > k);
+            // as far apart as along the line between their middles at least
+            const float* at = near_rod + j;
+            const V dx = x - *(const V*)at, dy = y - *(const V*)(at + edges), dz = z - *(const V*)(at + 2 * edges);
+            const V p0 = ax * dx + ay * dy + az * dz, dd = dx * dx + dy * dy + dz * dz;
+            const V q0 = *(const V*)(at + 3 * edges) * dx + *(const V*)(at + 4 * edges) * dy + *(const V*)(at + 5 * edges) * dz;
+            const V gap = dd - maximum(p0, -p0) - maximum(q0, -q0);
+            I near = (gap * maximum(gap, -gap) <= limit * dd) & (OWN + j < edge_count) & (other > k);
             for (int c = 0; c < 2; ++c) {
                 const I ends = *(const I*)(near_end + c * edges + j);
                 near &= (ends != p) & (ends != q);
