@@ -20,6 +20,27 @@ FLAT_SIDE = 5
 """Vertices along a side of the regions of a sheet's grid that are found to be flat enough to be passed over."""
 
 
+LOWER_RIGHT = 5
+"""Kinds of creases, the first ones, that are at the lower right corner."""
+
+
+def crease_ends(columns: int) -> tuple[tuple[int, int], ...]:
+    """Return for each kind of crease where the other edge ends, counted from the lowest vertex of the diagonal's cell.
+
+    First come those at the lower right of the two corners off the diagonal: two seams that leave it, and the diagonals
+    of the cells to the right, below and to the right below. Then the two seams that leave the upper left one, whose
+    diagonals see these from their own cells.
+
+    Args:
+        columns: Vertices in a row of the grid.
+    """
+    right, up = 1, columns
+    return (
+        (right, right + 1), (right - up, right), (right, right + up + 1), (-up, right), (right - up, right + 1),
+        (up - 1, up), (up, up + up),
+    )  # fmt: skip
+
+
 @dataclass(frozen=True, eq=False)
 class Leaves:
     """Vertices, triangles and edges sorted by leaf; each belongs to one.
@@ -40,6 +61,8 @@ class Leaves:
         span: (4 w,) int, the first and last column and the first and last row of each leaf's corners on that grid,
             each of the four for all leaves, in a row of whole sixteens.
         crease_corner: (c,) int, the lowest vertex of the window of 3 by 3 vertices that holds each crease.
+        crease_key: (c,) int, the lowest vertex of the cell whose diagonal each crease has, and n more for each number
+            of its kind (`crease_ends`).
     """
 
     vertex: np.ndarray
@@ -56,6 +79,7 @@ class Leaves:
     columns: int
     span: np.ndarray
     crease_corner: np.ndarray
+    crease_key: np.ndarray
 
     @property
     def count(self) -> int:
@@ -125,15 +149,26 @@ def make_leaves(
 
 def _grid(
     corner: np.ndarray, start: np.ndarray, crease: np.ndarray, columns: int, count: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return where leaves and creases are on a sheet's grid: `Leaves.span` and `Leaves.crease_corner`."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return where leaves and creases are on a sheet's grid: `Leaves.span`, `crease_corner` and `crease_key`."""
     leaves = len(start) - 1
     span = np.zeros((4, -(-leaves // 16) * 16), dtype=np.int64)
     if columns == 0:
-        return span.ravel(), np.zeros(len(crease), dtype=np.int64)
+        return span.ravel(), *np.zeros((2, len(crease)), dtype=np.int64)
     for k, place in enumerate((corner % columns, corner // columns)):
         span[2 * k, :leaves] = np.minimum.reduceat(place, start[:-1])
         span[2 * k + 1, :leaves] = np.maximum.reduceat(place, start[:-1])
     left = np.minimum((crease % columns).min(axis=1), columns - 3)
     low = np.minimum((crease // columns).min(axis=1), count // columns - 3)
-    return span.ravel(), low * columns + left
+    return span.ravel(), low * columns + left, _keys(crease, columns, count)
+
+
+def _keys(crease: np.ndarray, columns: int, count: int) -> np.ndarray:
+    """Return `Leaves.crease_key`."""
+    keys = np.zeros(len(crease), dtype=np.int64)
+    for first, second in ((crease[:, :2], crease[:, 2:]), (crease[:, 2:], crease[:, :2])):
+        cell = first[:, 0]
+        for kind, ends in enumerate(crease_ends(columns)):
+            such = (first[:, 1] == cell + columns + 1) & (second == cell[:, None] + ends).all(axis=1)
+            keys[such] = cell[such] + kind * count
+    return keys

@@ -3,9 +3,12 @@
 import warp as wp
 
 from nuno.contact.self.simd_tests import PRELUDE
+from nuno.topology.leaves import crease_ends
+
+CREASE_KINDS = len(crease_ends(1))
 
 # Where a world's scratch numbers stand, from `room` on: positions by fours and by coordinate, whether the squares at a
-# vertex are tame, spheres and corners of triangles and of edges, boxes of leaves and of groups of sixteen leaves, then
+# vertex are tame, and creases of each kind at it near, spheres and corners of triangles and of edges, boxes of leaves and of groups of sixteen leaves, then
 # the spheres and corners once more of those near a leaf. Loads of sixteen may reach beyond a row's last number.
 ROOM = """
 const int F = face.shape[0], E = edge.shape[0];
@@ -14,8 +17,8 @@ const int leaves_16 = (leaves + 15) / 16, boxes = 16 * leaves_16, groups = (leav
 float* point = (float*)room;
 const int row = points + 32;
 float *along_x = point + 4 * points, *along_y = along_x + row, *along_z = along_y + row;
-int *tame = (int*)(along_z + row), *uncreased = tame + row;
-float* ball = (float*)(uncreased + row);
+int *tame = (int*)(along_z + row), *uncreased = tame + row, *creased = uncreased + row;
+float* ball = (float*)(creased + CREASE_KINDS * points + 16);
 int* corner = (int*)(ball + 4 * faces);
 float* rod = (float*)(corner + 3 * faces);
 int* end = (int*)(rod + 6 * edges);
@@ -25,14 +28,14 @@ float* near_ball = group + 6 * groups;
 int *near_corner = (int*)(near_ball + 4 * faces), *near_face = near_corner + 3 * faces;
 float* near_rod = (float*)(near_face + faces);
 int *near_end = (int*)(near_rod + 6 * edges), *near_edge = near_end + 2 * edges;
-"""
+""".replace("CREASE_KINDS", str(CREASE_KINDS))
 
 
 def listing_room(points: int, faces: int, edges: int, leaves: int) -> int:
     """Return how many numbers the scratch room of `list_world` has."""
     whole = [-(-count // 16) * 16 for count in (faces, edges, leaves)]
     groups = -(-whole[2] // 256) * 16
-    return 4 * points + 5 * (points + 32) + 15 * (whole[0] + 16) + 17 * (whole[1] + 16) + 6 * whole[2] + 6 * groups
+    return (4 + CREASE_KINDS) * points + 16 + 5 * (points + 32) + 15 * (whole[0] + 16) + 17 * (whole[1] + 16) + 6 * whole[2] + 6 * groups
 
 
 @wp.func_native(

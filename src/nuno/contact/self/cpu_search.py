@@ -12,6 +12,7 @@ from typing import Any
 
 import warp as wp
 
+from nuno.contact.self.cpu_creases import mark_creases
 from nuno.contact.self.cpu_flat_regions import survey_world
 from nuno.contact.self.cpu_scratch import ROOM, bound_world, copy_world
 from nuno.contact.self.simd_tests import KEEP, NEAR_EDGES, NEAR_TRIANGLES, PRELUDE
@@ -194,17 +195,27 @@ for (int a = 0; a < leaves; ++a) {
 if (faces_waiting) test_faces(faces_waiting);
 if (edges_waiting) test_edges(edges_waiting);
 const int creases = crease.shape[0];
-for (int k = 0; k < creases; k += 16) {
-    I near = OWN + k < creases;
-    if (columns > 0) near &= ~take_int(uncreased, take_int(crease_corner.data, smaller(OWN + k, creases - 1)));
-    if (bits(near) == 0) continue;
-    const I row = smaller(OWN + k, creases - 1) * 4;
+int crease_of[32], creases_waiting = 0;
+for (int l = 0; l < 32; ++l) crease_of[l] = 0;
+auto test_creases = [&](int count) ALONE {
+    const I row = *(const I*)crease_of * 4;
     const int* table = (const int*)crease.data;
     const I a = take_int(table, row), b = take_int(table + 1, row);
     const I c = take_int(table + 2, row), d = take_int(table + 3, row);
-    const unsigned hit = bits((near_edges(point, point + 1, point + 2, 4, a, b, c, d, limit) > 0.f) & near);
-    keep(hit, a, b, c, d, *counted[1], (int*)pairs, 1, max_pairs, max_pairs);
+    const unsigned hit = bits(near_edges(point, point + 1, point + 2, 4, a, b, c, d, limit) > 0.f);
+    keep(hit & ((1u << count) - 1), a, b, c, d, *counted[1], (int*)pairs, 1, max_pairs, max_pairs);
+};
+for (int k = 0; k < creases; k += 16) {
+    I near = OWN + k < creases;
+    if (columns > 0) near &= take_int(creased, take_int(crease_key.data, smaller(OWN + k, creases - 1)));
+    creases_waiting = pack(crease_of, creases_waiting, OWN + k, bits(near));
+    if (creases_waiting >= 16) {
+        test_creases(16);
+        creases_waiting -= 16;
+        *(I*)crease_of = *(const I*)(crease_of + 16);
+    }
 }
+if (creases_waiting) test_creases(creases_waiting);
 #endif
 """.replace("RANGES", str(RANGES))
     .replace("FLAT_SIDE", str(FLAT_SIDE))
@@ -219,7 +230,7 @@ def search_world(
     leaf_edge_start: wp.array(dtype=int),
     leaf_span: wp.array(dtype=int),
     crease: wp.array(dtype=wp.vec4i),
-    crease_corner: wp.array(dtype=int),
+    crease_key: wp.array(dtype=int),
     columns: int,
     points: int,
     leaves: int,
@@ -318,9 +329,9 @@ def list_world(t: Any, topo: Topology, far: float, which: int, lanes: int):
         t.bounds.ptr + skip,
     )
     if topo.columns > 0:
-        survey_world(
-            topo.leaf_face, topo.leaf_edge, topo.columns, n, topo.leaves, room, far
-        )  # fmt: skip
+        survey_world(topo.leaf_face, topo.leaf_edge, topo.columns, n, topo.leaves, room, far)
+        if topo.crease.shape[0] > 0:
+            mark_creases(topo.leaf_face, topo.leaf_edge, topo.columns, n, topo.leaves, room, far)
     search_world(
         topo.leaf_face,
         topo.leaf_edge,
@@ -330,7 +341,7 @@ def list_world(t: Any, topo: Topology, far: float, which: int, lanes: int):
         topo.leaf_edge_start,
         topo.leaf_span,
         topo.crease,
-        topo.crease_corner,
+        topo.crease_key,
         topo.columns,
         n,
         topo.leaves,
