@@ -14,14 +14,22 @@ LEAF_VERTICES = 4
 """Vertices of a block, at most."""
 
 
-REGION = 16
-"""Consecutive leaves whose displacements are looked at together, to tell how long a list is good."""
+SMALLEST_REGION, LARGEST_REGION = 4, 16
+"""Consecutive leaves whose displacements are looked at together, to tell how long a list is good: finer regions tell it
+longer, and each is asked beside each other."""
+REGIONS = 32
+"""About so many regions a cloth has, within these bounds."""
 FLAT_SIDE = 5
 """Vertices along a side of the regions of a sheet's grid that are found to be flat enough to be passed over."""
 
 
 LOWER_RIGHT = 5
 """Kinds of creases, the first ones, that are at the lower right corner."""
+
+
+def region_leaves(leaves: int) -> int:
+    """Return how many consecutive leaves of so many make a region; the last one may have fewer."""
+    return min(max(leaves // REGIONS, SMALLEST_REGION), LARGEST_REGION)
 
 
 def crease_ends(columns: int) -> tuple[tuple[int, int], ...]:
@@ -55,7 +63,7 @@ class Leaves:
         corner: (k,) int, all vertices that a leaf's own elements have, sorted by leaf.
         corner_start: (count + 1,) int.
         crease: (c, 4) int, further pairs of edges that collide, with each other only.
-        region_corner: (r,) int, all vertices of the elements of each region of `REGION` consecutive leaves.
+        region_corner: (r,) int, all vertices of the elements of each region of `region_leaves` leaves.
         region_start: (regions + 1,) int.
         columns: Vertices in a row of a sheet's grid, if the grid has regions of `FLAT_SIDE` vertices a side; else 0.
         span: (4 w,) int, the first and last column and the first and last row of each leaf's corners on that grid,
@@ -136,8 +144,9 @@ def make_leaves(
     own = np.concatenate([group * count + np.arange(count), (face_owner[:, None] * count + face).ravel()])
     own = np.unique(np.concatenate([own, (edge_owner[:, None] * count + edge).ravel()]))
     starts = np.arange(leaves + 1)
-    region = np.unique(own // count // REGION * count + own % count)
-    region_start = np.searchsorted(region // count, np.arange(-(-leaves // REGION) + 1))
+    side = region_leaves(leaves)
+    region = np.unique(own // count // side * count + own % count)
+    region_start = np.searchsorted(region // count, np.arange(-(-leaves // side) + 1))
     corner, corner_start = own % count, np.searchsorted(own // count, starts)
     if min(columns, count // max(1, columns)) < FLAT_SIDE:
         columns = 0

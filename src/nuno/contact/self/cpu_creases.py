@@ -40,7 +40,9 @@ for (int q = 0; q < rows - 1; ++q)
             const V along = (ex * dx + ey * dy + ez * dz) / square;
             ex -= along * dx, ey -= along * dy, ez -= along * dz;
             const V from = ax * ex + ay * ey + az * ez, reach = limit * (ex * ex + ey * ey + ez * ez);
-            auto project = [&](int k) { return load(along_x + k) * ex + load(along_y + k) * ey + load(along_z + k) * ez; };
+            auto project = [&](int k) {
+                return load(along_x + k) * ex + load(along_y + k) * ey + load(along_z + k) * ez;
+            };
             ROLLED for (int kind = side ? LOWER_RIGHT : 0; kind < (side ? CREASE_KINDS : LOWER_RIGHT); ++kind) {
                 const V gap = minimum(project(a + ends[kind][0]), project(a + ends[kind][1])) - from;
                 *(I*)(creased + kind * points + a) = gap * maximum(gap, -gap) <= reach;

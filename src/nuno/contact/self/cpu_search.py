@@ -167,13 +167,13 @@ for (int a = 0; a < leaves; ++a) {
         const int p = end[k], q = end[edges + k];
         for (int j = 0; j < edge_count; j += 16) {
             const I other = *(const I*)(near_edge + j);
-            // as far apart as along the line between their middles at least
-            const float* at = near_rod + j;
-            const V dx = x - *(const V*)at, dy = y - *(const V*)(at + edges), dz = z - *(const V*)(at + 2 * edges);
-            const V p0 = ax * dx + ay * dy + az * dz, dd = dx * dx + dy * dy + dz * dz;
-            const V q0 = *(const V*)(at + 3 * edges) * dx + *(const V*)(at + 4 * edges) * dy + *(const V*)(at + 5 * edges) * dz;
-            const V gap = dd - maximum(p0, -p0) - maximum(q0, -q0);
-            I near = (gap * maximum(gap, -gap) <= limit * dd) & (OWN + j < edge_count) & (other > k);
+            // no nearer to each other than along the line between their middles
+            auto load = [&](int row) { return *(const V*)(near_rod + row * edges + j); };
+            const V dx = x - load(0), dy = y - load(1), dz = z - load(2), bx = load(3), by = load(4), bz = load(5);
+            const V first = ax * dx + ay * dy + az * dz, second = bx * dx + by * dy + bz * dz;
+            const V square = dx * dx + dy * dy + dz * dz;
+            const V gap = square - maximum(first, -first) - maximum(second, -second);
+            I near = (gap * maximum(gap, -gap) <= limit * square) & (OWN + j < edge_count) & (other > k);
             for (int c = 0; c < 2; ++c) {
                 const I ends = *(const I*)(near_end + c * edges + j);
                 near &= (ends != p) & (ends != q);
