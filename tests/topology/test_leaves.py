@@ -23,7 +23,7 @@ def test_a_key_names_its_crease(cells: tuple[int, int]) -> None:
 
 
 def test_regions_have_every_vertex() -> None:
-    """Exact: all vertices are in some region, there are as many regions as their size asks for, and sizes have bounds."""
+    """Exact: all vertices are in some region, there are as many as their size asks for, and sizes have bounds."""
     for cells in ((3, 3), (20, 16), (30, 30), (64, 64)):
         leaves = ClothTopology.sheet(cells, (0.6, 0.5)).leaves
         assert len(np.unique(leaves.region_corner)) == (cells[0] + 1) * (cells[1] + 1)
