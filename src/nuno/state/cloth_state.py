@@ -152,6 +152,7 @@ Topology = make_struct("Topology", __name__, {
     # how many of these are edges', and how long an edge may become [m]
     "side": _PAIRS, "face": wp.array(dtype=wp.vec3i), "feature_colour": _INTS, "side_colours": int, "longest": float,
     "region_corner": _INTS, "region_start": _INTS, "columns": int, "leaf_span": _INTS, "crease_corner": _INTS,
+    "crease_key": _INTS,
 })  # fmt: skip
 """The cloth's elements, the same in every world: those of `nuno.topology.cloth_topology.ELEMENT_KINDS`, and edges."""
 

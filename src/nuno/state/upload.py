@@ -15,7 +15,7 @@ LEAF_ARRAYS = {
     "leaf_face_start": "face_start", "leaf_edge": "edge", "leaf_edge_start": "edge_start",
     "leaf_corner": "corner", "leaf_corner_start": "corner_start", "crease": "crease",
     "region_corner": "region_corner", "region_start": "region_start", "leaf_span": "span",
-    "crease_corner": "crease_corner",
+    "crease_corner": "crease_corner", "crease_key": "crease_key",
 }  # fmt: skip
 """The arrays of a `nuno.state.cloth_state.Topology` that come from `nuno.topology.leaves.Leaves`, and their names
 there."""

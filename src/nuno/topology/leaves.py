@@ -14,10 +14,39 @@ LEAF_VERTICES = 4
 """Vertices of a block, at most."""
 
 
-REGION = 16
-"""Consecutive leaves whose displacements are looked at together, to tell how long a list is good."""
+SMALLEST_REGION, LARGEST_REGION = 4, 16
+"""Consecutive leaves whose displacements are looked at together, to tell how long a list is good: finer regions tell it
+longer, and each is asked beside each other."""
+REGIONS = 32
+"""About so many regions a cloth has, within these bounds."""
 FLAT_SIDE = 5
 """Vertices along a side of the regions of a sheet's grid that are found to be flat enough to be passed over."""
+
+
+LOWER_RIGHT = 5
+"""Kinds of creases, the first ones, that are at the lower right corner."""
+
+
+def region_leaves(leaves: int) -> int:
+    """Return how many consecutive leaves of so many make a region; the last one may have fewer."""
+    return min(max(leaves // REGIONS, SMALLEST_REGION), LARGEST_REGION)
+
+
+def crease_ends(columns: int) -> tuple[tuple[int, int], ...]:
+    """Return for each kind of crease where the other edge ends, counted from the lowest vertex of the diagonal's cell.
+
+    First come those at the lower right of the two corners off the diagonal: two seams that leave it, and the diagonals
+    of the cells to the right, below and to the right below. Then the two seams that leave the upper left one, whose
+    diagonals see these from their own cells.
+
+    Args:
+        columns: Vertices in a row of the grid.
+    """
+    right, up = 1, columns
+    return (
+        (right, right + 1), (right - up, right), (right, right + up + 1), (-up, right), (right - up, right + 1),
+        (up - 1, up), (up, up + up),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,12 +63,14 @@ class Leaves:
         corner: (k,) int, all vertices that a leaf's own elements have, sorted by leaf.
         corner_start: (count + 1,) int.
         crease: (c, 4) int, further pairs of edges that collide, with each other only.
-        region_corner: (r,) int, all vertices of the elements of each region of `REGION` consecutive leaves.
+        region_corner: (r,) int, all vertices of the elements of each region of `region_leaves` leaves.
         region_start: (regions + 1,) int.
         columns: Vertices in a row of a sheet's grid, if the grid has regions of `FLAT_SIDE` vertices a side; else 0.
         span: (4 w,) int, the first and last column and the first and last row of each leaf's corners on that grid,
             each of the four for all leaves, in a row of whole sixteens.
         crease_corner: (c,) int, the lowest vertex of the window of 3 by 3 vertices that holds each crease.
+        crease_key: (c,) int, the lowest vertex of the cell whose diagonal each crease has, and n more for each number
+            of its kind (`crease_ends`).
     """
 
     vertex: np.ndarray
@@ -56,6 +87,7 @@ class Leaves:
     columns: int
     span: np.ndarray
     crease_corner: np.ndarray
+    crease_key: np.ndarray
 
     @property
     def count(self) -> int:
@@ -112,8 +144,9 @@ def make_leaves(
     own = np.concatenate([group * count + np.arange(count), (face_owner[:, None] * count + face).ravel()])
     own = np.unique(np.concatenate([own, (edge_owner[:, None] * count + edge).ravel()]))
     starts = np.arange(leaves + 1)
-    region = np.unique(own // count // REGION * count + own % count)
-    region_start = np.searchsorted(region // count, np.arange(-(-leaves // REGION) + 1))
+    side = region_leaves(leaves)
+    region = np.unique(own // count // side * count + own % count)
+    region_start = np.searchsorted(region // count, np.arange(-(-leaves // side) + 1))
     corner, corner_start = own % count, np.searchsorted(own // count, starts)
     if min(columns, count // max(1, columns)) < FLAT_SIDE:
         columns = 0
@@ -125,15 +158,26 @@ def make_leaves(
 
 def _grid(
     corner: np.ndarray, start: np.ndarray, crease: np.ndarray, columns: int, count: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return where leaves and creases are on a sheet's grid: `Leaves.span` and `Leaves.crease_corner`."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return where leaves and creases are on a sheet's grid: `Leaves.span`, `crease_corner` and `crease_key`."""
     leaves = len(start) - 1
     span = np.zeros((4, -(-leaves // 16) * 16), dtype=np.int64)
     if columns == 0:
-        return span.ravel(), np.zeros(len(crease), dtype=np.int64)
+        return span.ravel(), *np.zeros((2, len(crease)), dtype=np.int64)
     for k, place in enumerate((corner % columns, corner // columns)):
         span[2 * k, :leaves] = np.minimum.reduceat(place, start[:-1])
         span[2 * k + 1, :leaves] = np.maximum.reduceat(place, start[:-1])
     left = np.minimum((crease % columns).min(axis=1), columns - 3)
     low = np.minimum((crease // columns).min(axis=1), count // columns - 3)
-    return span.ravel(), low * columns + left
+    return span.ravel(), low * columns + left, _keys(crease, columns, count)
+
+
+def _keys(crease: np.ndarray, columns: int, count: int) -> np.ndarray:
+    """Return `Leaves.crease_key`."""
+    keys = np.zeros(len(crease), dtype=np.int64)
+    for first, second in ((crease[:, :2], crease[:, 2:]), (crease[:, 2:], crease[:, :2])):
+        cell = first[:, 0]
+        for kind, ends in enumerate(crease_ends(columns)):
+            such = (first[:, 1] == cell + columns + 1) & (second == cell[:, None] + ends).all(axis=1)
+            keys[such] = cell[such] + kind * count
+    return keys

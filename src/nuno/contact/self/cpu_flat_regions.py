@@ -20,28 +20,23 @@ from nuno.topology.leaves import FLAT_SIDE
     + """
 const int rows = points / columns;
 const float enough = 1.001f * far;
-const float* along[3] = {along_x, along_y, along_z};
-auto project = [&](int k, const V* d) ALONE {
-    return *(const V*)(along_x + k) * d[0] + *(const V*)(along_y + k) * d[1] + *(const V*)(along_z + k) * d[2];
-};
+auto load = [](const float* x) { return *(const V*)x; };
 for (int q = 0; q <= rows - 3; ++q)
     for (int p = 0; p <= columns - 3; p += 16) {
-        const int at = q * columns + p;
-        V d[3], length = {}, high[5], low[5];
-        ROLLED for (int c = 0; c < 3; ++c) {
-            d[c] = *(const V*)(along[c] + at + 2) - *(const V*)(along[c] + at + 2 * columns);
-            length += d[c] * d[c];
-        }
+        const int at = q * columns + p, right = at + 2, left = at + 2 * columns;
+        const V dx = load(along_x + right) - load(along_x + left), dy = load(along_y + right) - load(along_y + left);
+        const V dz = load(along_z + right) - load(along_z + left), length = dx * dx + dy * dy + dz * dz;
+        auto project = [&](int i, int j) {
+            const int k = at + j * columns + i;
+            return load(along_x + k) * dx + load(along_y + k) * dy + load(along_z + k) * dz;
+        };
         // along one diagonal, what the vertices of the others have between them
-        ROLLED for (int k = 0; k < 5; ++k) high[k] = (V){} - 1e30f, low[k] = (V){} + 1e30f;
-        ROLLED for (int j = 0; j < 3; ++j)
-            ROLLED for (int i = 0; i < 3; ++i) {
-                const V s = project(at + j * columns + i, d);
-                high[i - j + 2] = maximum(high[i - j + 2], s);
-                low[i - j + 2] = minimum(low[i - j + 2], s);
-            }
-        V gap = low[1] - high[0];
-        ROLLED for (int k = 1; k < 4; ++k) gap = minimum(gap, low[k + 1] - high[k]);
+        const V a = project(0, 1), b = project(1, 2), c = project(0, 0), d = project(1, 1), e = project(2, 2);
+        const V f = project(1, 0), g = project(2, 1);
+        V gap = minimum(a, b) - project(0, 2);
+        gap = minimum(gap, minimum(c, minimum(d, e)) - maximum(a, b));
+        gap = minimum(gap, minimum(f, g) - maximum(c, maximum(d, e)));
+        gap = minimum(gap, project(2, 0) - maximum(f, g));
         *(I*)(uncreased + at) = gap > __builtin_elementwise_sqrt(length) * enough;
     }
 for (int q = 0; q <= rows - FLAT_SIDE; ++q)
@@ -53,27 +48,27 @@ for (int q = 0; q <= rows - FLAT_SIDE; ++q)
         // from column to column, then from row to row
         ROLLED for (int turn = 0; turn < 2; ++turn) {
             const int step = turn ? columns : 1, other = turn ? 1 : columns;
-            V d[3], length = {};
-            ROLLED for (int c = 0; c < 3; ++c) {
-                d[c] = (V){};
-                ROLLED for (int j = 0; j < FLAT_SIDE; ++j) {
-                    const float* x = along[c] + at + j * other;
-                    d[c] += *(const V*)(x + (FLAT_SIDE - 1) * step) - *(const V*)x;
-                }
-                length += d[c] * d[c];
+            // numbers by name: those of an array would be written to memory and read again
+            V dx = {}, dy = {}, dz = {};
+            ROLLED for (int j = 0; j < FLAT_SIDE; ++j) {
+                const int k = at + j * other, beyond = k + (FLAT_SIDE - 1) * step;
+                dx += load(along_x + beyond) - load(along_x + k);
+                dy += load(along_y + beyond) - load(along_y + k);
+                dz += load(along_z + beyond) - load(along_z + k);
             }
             V gap = (V){} + 1e30f, before = (V){} - 2e30f;
             ROLLED for (int i = 0; i < FLAT_SIDE; ++i) {
                 V high = (V){} - 1e30f, low = (V){} + 1e30f;
                 ROLLED for (int j = 0; j < FLAT_SIDE; ++j) {
-                    const V s = project(at + i * step + j * other, d);
+                    const int k = at + i * step + j * other;
+                    const V s = load(along_x + k) * dx + load(along_y + k) * dy + load(along_z + k) * dz;
                     high = maximum(high, s);
                     low = minimum(low, s);
                 }
                 gap = minimum(gap, low - before);
                 before = high;
             }
-            good &= gap > __builtin_elementwise_sqrt(length) * enough;
+            good &= gap > __builtin_elementwise_sqrt(dx * dx + dy * dy + dz * dz) * enough;
         }
         *(I*)(tame + at) = good;
     }

@@ -3,10 +3,14 @@
 import warp as wp
 
 from nuno.contact.self.simd_tests import PRELUDE
+from nuno.topology.leaves import LARGEST_REGION, REGIONS, SMALLEST_REGION, crease_ends
+
+CREASE_KINDS = len(crease_ends(1))
 
 # Where a world's scratch numbers stand, from `room` on: positions by fours and by coordinate, whether the squares at a
-# vertex are tame, spheres and corners of triangles and of edges, boxes of leaves and of groups of sixteen leaves, then
-# the spheres and corners once more of those near a leaf. Loads of sixteen may reach beyond a row's last number.
+# vertex are tame and the creases of each kind near, spheres and corners of triangles, middles, halves and ends of
+# edges, boxes of leaves and of groups of sixteen leaves, then triangles and edges once more, those near a leaf. Loads
+# of sixteen may reach beyond a row's last number.
 ROOM = """
 const int F = face.shape[0], E = edge.shape[0];
 const int faces = (F + 15) / 16 * 16 + 16, edges = (E + 15) / 16 * 16 + 16;
@@ -14,25 +18,26 @@ const int leaves_16 = (leaves + 15) / 16, boxes = 16 * leaves_16, groups = (leav
 float* point = (float*)room;
 const int row = points + 32;
 float *along_x = point + 4 * points, *along_y = along_x + row, *along_z = along_y + row;
-int *tame = (int*)(along_z + row), *uncreased = tame + row;
-float* ball = (float*)(uncreased + row);
+int *tame = (int*)(along_z + row), *uncreased = tame + row, *creased = uncreased + row;
+float* ball = (float*)(creased + CREASE_KINDS * points + 16);
 int* corner = (int*)(ball + 4 * faces);
 float* rod = (float*)(corner + 3 * faces);
-int* end = (int*)(rod + 4 * edges);
+int* end = (int*)(rod + 6 * edges);
 float* box = (float*)(end + 2 * edges);
 float* group = box + 6 * boxes;
 float* near_ball = group + 6 * groups;
 int *near_corner = (int*)(near_ball + 4 * faces), *near_face = near_corner + 3 * faces;
 float* near_rod = (float*)(near_face + faces);
-int *near_end = (int*)(near_rod + 4 * edges), *near_edge = near_end + 2 * edges;
-"""
+int *near_end = (int*)(near_rod + 6 * edges), *near_edge = near_end + 2 * edges;
+""".replace("CREASE_KINDS", str(CREASE_KINDS))
 
 
 def listing_room(points: int, faces: int, edges: int, leaves: int) -> int:
     """Return how many numbers the scratch room of `list_world` has."""
     whole = [-(-count // 16) * 16 for count in (faces, edges, leaves)]
     groups = -(-whole[2] // 256) * 16
-    return 4 * points + 5 * (points + 32) + 15 * (whole[0] + 16) + 13 * (whole[1] + 16) + 6 * whole[2] + 6 * groups
+    of_points = (4 + CREASE_KINDS) * points + 16 + 5 * (points + 32)
+    return of_points + 15 * (whole[0] + 16) + 17 * (whole[1] + 16) + 6 * whole[2] + 6 * groups
 
 
 @wp.func_native(
@@ -96,7 +101,9 @@ for (int j = 0; j < E; j += 16) {
     *(V*)(rod + j) = x + dx;
     *(V*)(rod + edges + j) = y + dy;
     *(V*)(rod + 2 * edges + j) = z + dz;
-    *(V*)(rod + 3 * edges + j) = __builtin_elementwise_sqrt(dx * dx + dy * dy + dz * dz);
+    *(V*)(rod + 3 * edges + j) = dx;
+    *(V*)(rod + 4 * edges + j) = dy;
+    *(V*)(rod + 5 * edges + j) = dz;
 }
 for (int b = 0; b < boxes; ++b) {
     // beyond the last leaf stand boxes that meet nothing
@@ -120,10 +127,22 @@ for (int g = 0; g < groups; ++g)
             value = c < 3 ? __builtin_reduce_min(row) : __builtin_reduce_max(row);
         }
         group[c * groups + g] = value;
-        if (g < leaves_16) ((float*)bounds)[(6 * g + c) * lanes] = value;
+    }
+int side = leaves / REGIONS < SMALLEST_REGION ? SMALLEST_REGION : leaves / REGIONS;
+if (side > LARGEST_REGION) side = LARGEST_REGION;
+for (int r = 0; r * side < leaves; ++r)
+    for (int c = 0; c < 6; ++c) {
+        // boxes beyond the last leaf change nothing
+        const int last = (r + 1) * side < boxes ? (r + 1) * side : boxes;
+        const float* of = box + c * boxes;
+        float value = of[r * side];
+        for (int b = r * side + 1; b < last; ++b) value = (c < 3) == (of[b] < value) ? of[b] : value;
+        ((float*)bounds)[(6 * r + c) * lanes] = value;
     }
 #endif
-"""
+""".replace("SMALLEST_REGION", str(SMALLEST_REGION))
+    .replace("LARGEST_REGION", str(LARGEST_REGION))
+    .replace("REGIONS", str(REGIONS))
 )
 def bound_world(
     face: wp.array(dtype=wp.vec3i),
@@ -136,7 +155,7 @@ def bound_world(
     lanes: int,
     bounds: wp.uint64,
 ):
-    """Spheres around all triangles and edges, boxes around all leaves and regions of sixteen leaves.
+    """Spheres around all triangles, halves of edges, boxes around all leaves, sixteens of them and regions.
 
     The regions' boxes are noted too, every ``lanes``-th number, for `nuno.contact.self.list_rebuild` to ask later.
     """

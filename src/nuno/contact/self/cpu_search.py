@@ -12,6 +12,7 @@ from typing import Any
 
 import warp as wp
 
+from nuno.contact.self.cpu_creases import mark_creases
 from nuno.contact.self.cpu_flat_regions import survey_world
 from nuno.contact.self.cpu_scratch import ROOM, bound_world, copy_world
 from nuno.contact.self.simd_tests import KEEP, NEAR_EDGES, NEAR_TRIANGLES, PRELUDE
@@ -64,6 +65,15 @@ auto safe = [&](int a, int start) ALONE {
     const I high = larger(*(const I*)(span + 3 * spans + start), span[3 * spans + a]);
     const I at = smaller(low, points / columns - FLAT_SIDE) * columns + smaller(left, columns - FLAT_SIDE);
     return bits((right - left < FLAT_SIDE) & (high - low < FLAT_SIDE) & take_int(tame, at));
+};
+// the edges whose boxes meet a box
+auto meet = [&](const float* rows, int count, int k, const float* low, const float* high) {
+    V gap = (V){} + 1e30f;
+    for (int c = 0; c < 3; ++c) {
+        const V x = *(const V*)(rows + c * count + k), half = *(const V*)(rows + (c + 3) * count + k);
+        gap = minimum(gap, minimum(x - low[c], high[c] - x) + maximum(half, -half));
+    }
+    return gap > 0.f;
 };
 int* counted[2] = {(int*)pair_count, (int*)pair_count + lanes};
 for (int c = 0; c < 2; ++c) {
@@ -123,9 +133,9 @@ for (int a = 0; a < leaves; ++a) {
         }
         const int begin = edge_start[first[r]];
         for (int j = begin > edge_start[a] ? begin : edge_start[a]; j < edge_stop; j += 16) {
-            const unsigned some = bits(reach(rod, edges, j, low, high) & (OWN + j < edge_stop));
+            const unsigned some = bits(meet(rod, edges, j, low, high) & (OWN + j < edge_stop));
             if (some == 0) continue;
-            ROLLED for (int c = 0; c < 4; ++c)
+            ROLLED for (int c = 0; c < 6; ++c)
                 pack((int*)near_rod + c * edges, edge_count, *(const I*)(rod + c * edges + j), some);
             ROLLED for (int c = 0; c < 2; ++c)
                 pack(near_end + c * edges, edge_count, *(const I*)(end + c * edges + j), some);
@@ -152,11 +162,18 @@ for (int a = 0; a < leaves; ++a) {
         }
     }
     for (int k = edge_start[a]; k < edge_start[a + 1]; ++k) {
-        const float x = rod[k], y = rod[edges + k], z = rod[2 * edges + k], rod_reach = rod[3 * edges + k] + far;
+        const float x = rod[k], y = rod[edges + k], z = rod[2 * edges + k];
+        const float ax = rod[3 * edges + k], ay = rod[4 * edges + k], az = rod[5 * edges + k];
         const int p = end[k], q = end[edges + k];
         for (int j = 0; j < edge_count; j += 16) {
             const I other = *(const I*)(near_edge + j);
-            I near = within(near_rod, edges, j, x, y, z, rod_reach) & (OWN + j < edge_count) & (other > k);
+            // no nearer to each other than along the line between their middles
+            auto load = [&](int row) { return *(const V*)(near_rod + row * edges + j); };
+            const V dx = x - load(0), dy = y - load(1), dz = z - load(2), bx = load(3), by = load(4), bz = load(5);
+            const V first = ax * dx + ay * dy + az * dz, second = bx * dx + by * dy + bz * dz;
+            const V square = dx * dx + dy * dy + dz * dz;
+            const V gap = square - maximum(first, -first) - maximum(second, -second);
+            I near = (gap * maximum(gap, -gap) <= limit * square) & (OWN + j < edge_count) & (other > k);
             for (int c = 0; c < 2; ++c) {
                 const I ends = *(const I*)(near_end + c * edges + j);
                 near &= (ends != p) & (ends != q);
@@ -178,17 +195,27 @@ for (int a = 0; a < leaves; ++a) {
 if (faces_waiting) test_faces(faces_waiting);
 if (edges_waiting) test_edges(edges_waiting);
 const int creases = crease.shape[0];
-for (int k = 0; k < creases; k += 16) {
-    I near = OWN + k < creases;
-    if (columns > 0) near &= ~take_int(uncreased, take_int(crease_corner.data, smaller(OWN + k, creases - 1)));
-    if (bits(near) == 0) continue;
-    const I row = smaller(OWN + k, creases - 1) * 4;
+int crease_of[32], creases_waiting = 0;
+for (int l = 0; l < 32; ++l) crease_of[l] = 0;
+auto test_creases = [&](int count) ALONE {
+    const I row = *(const I*)crease_of * 4;
     const int* table = (const int*)crease.data;
     const I a = take_int(table, row), b = take_int(table + 1, row);
     const I c = take_int(table + 2, row), d = take_int(table + 3, row);
-    const unsigned hit = bits((near_edges(point, point + 1, point + 2, 4, a, b, c, d, limit) > 0.f) & near);
-    keep(hit, a, b, c, d, *counted[1], (int*)pairs, 1, max_pairs, max_pairs);
+    const unsigned hit = bits(near_edges(point, point + 1, point + 2, 4, a, b, c, d, limit) > 0.f);
+    keep(hit & ((1u << count) - 1), a, b, c, d, *counted[1], (int*)pairs, 1, max_pairs, max_pairs);
+};
+for (int k = 0; k < creases; k += 16) {
+    I near = OWN + k < creases;
+    if (columns > 0) near &= take_int(creased, take_int(crease_key.data, smaller(OWN + k, creases - 1)));
+    creases_waiting = pack(crease_of, creases_waiting, OWN + k, bits(near));
+    if (creases_waiting >= 16) {
+        test_creases(16);
+        creases_waiting -= 16;
+        *(I*)crease_of = *(const I*)(crease_of + 16);
+    }
 }
+if (creases_waiting) test_creases(creases_waiting);
 #endif
 """.replace("RANGES", str(RANGES))
     .replace("FLAT_SIDE", str(FLAT_SIDE))
@@ -203,7 +230,7 @@ def search_world(
     leaf_edge_start: wp.array(dtype=int),
     leaf_span: wp.array(dtype=int),
     crease: wp.array(dtype=wp.vec4i),
-    crease_corner: wp.array(dtype=int),
+    crease_key: wp.array(dtype=int),
     columns: int,
     points: int,
     leaves: int,
@@ -302,9 +329,9 @@ def list_world(t: Any, topo: Topology, far: float, which: int, lanes: int):
         t.bounds.ptr + skip,
     )
     if topo.columns > 0:
-        survey_world(
-            topo.leaf_face, topo.leaf_edge, topo.columns, n, topo.leaves, room, far
-        )  # fmt: skip
+        survey_world(topo.leaf_face, topo.leaf_edge, topo.columns, n, topo.leaves, room, far)
+        if topo.crease.shape[0] > 0:
+            mark_creases(topo.leaf_face, topo.leaf_edge, topo.columns, n, topo.leaves, room, far)
     search_world(
         topo.leaf_face,
         topo.leaf_edge,
@@ -314,7 +341,7 @@ def list_world(t: Any, topo: Topology, far: float, which: int, lanes: int):
         topo.leaf_edge_start,
         topo.leaf_span,
         topo.crease,
-        topo.crease_corner,
+        topo.crease_key,
         topo.columns,
         n,
         topo.leaves,
