@@ -52,10 +52,10 @@ def future_commands(robot: CommandedRobot, futures: World, k: int) -> Callable[[
     copies: Any = next((other for other in futures.drivers if getattr(other, "original", None) is robot), None)
     if copies is None:
         raise BodyStateError(f"{name!r} is not in these futures: it entered the world after they were imagined")
-    under_way, servo, told = copies.commanded_in(k)
+    under_way, servo, given = copies.commanded_in(k)
     _, _, joints, gait = under_way
     goes_on, passed = robot.joints.are_as(joints), robot.joints.clock - joints[0][0]
-    sent, orders = ([own for own in told if isinstance(own, kind)] for kind in (Sent, WalkOrder))
+    sent, orders = ([own for own in given if isinstance(own, kind)] for kind in (Sent, WalkOrder))
     if not goes_on and robot.gait.is_walking:
         raise BodyStateError(f"{name!r} walks, and these futures were imagined earlier: wait until it stands")
     if not goes_on and gait[2] is not None:

@@ -98,7 +98,7 @@ class ImaginedRobot(ImaginedBase):
         # what is under way as the robot itself is imagined, and what each copy was sent since
         self._under_way: Any = motion if of is None else of[0]._under_way
         self._sent: list[tuple[Sent | WalkOrder, ...]] = [() if of is None else of[0]._sent[of[1]]] * world.world_count
-        self._told_of_legs = False
+        self._warned_of_legs = False
         self._base_goals: list[Goal | None] = [None] * world.world_count  # of walks that were refused
         self._links = [world.find(body.name) for body in original.links.bodies]
         self.balance: Balance | None = None
@@ -253,8 +253,8 @@ class ImaginedRobot(ImaginedBase):
                 trajectory = JointTrajectory(names, times, goals[:, rows], speeds[:, rows])
                 own.joints.send(name, trajectory)
                 self._sent[k] += (Sent(own.joints.clock, name, trajectory),)
-        if kept and not self._told_of_legs:
-            self._told_of_legs = True
+        if kept and not self._warned_of_legs:
+            self._warned_of_legs = True
             logger.warning(
                 "%r walks in worlds %s: its legs are the walk's there, and go nowhere else before it stands (go_stop)",
                 self.original.actual.name, sorted(set(kept)),
@@ -332,8 +332,8 @@ class ImaginedRobot(ImaginedBase):
         joints = () if self.balance is None else self.balance.dynamics.save()
         found = [guard.save() for guard in self._guards]
         self._together.bring()
-        motions, told = [own.save() for own in self._motions], (list(self._sent), list(self._base_goals))
-        return list(self._states), motions, joints, self._servo, found, told
+        motions, given = [own.save() for own in self._motions], (list(self._sent), list(self._base_goals))
+        return list(self._states), motions, joints, self._servo, found, given
 
     def load(self, saved: Any) -> None:
         """Become what it was when a snapshot was taken."""
