@@ -55,7 +55,8 @@ def future_commands(robot: CommandedRobot, futures: World, k: int) -> Callable[[
     under_way, servo, given = copies.commanded_in(k)
     _, _, joints, gait = under_way
     goes_on, passed = robot.joints.are_as(joints), robot.joints.clock - joints[0][0]
-    sent, orders = ([own for own in given if isinstance(own, kind)] for kind in (Sent, WalkOrder))
+    sent = [own for own in given if isinstance(own, Sent)]
+    orders = [own for own in given if isinstance(own, WalkOrder)]
     if not goes_on and robot.gait.is_walking:
         raise BodyStateError(f"{name!r} walks, and these futures were imagined earlier: wait until it stands")
     if not goes_on and gait[2] is not None:

@@ -130,8 +130,8 @@ class ImaginedBase:
             standing = [each for each in asked if not self._motions[each[0]].gait.is_walking]
             # kept until copies hold them, as robots that stand alike take the same
             planned = [
-                self._motions[w].gait.planned(*own, sec)
-                for w, own in with_bar(standing, "planning walks", progress, "walk")
+                self._motions[w].gait.planned(x, y, yaw, sec)
+                for w, (x, y, yaw) in with_bar(standing, "planning walks", progress, "walk")
             ]
             why: dict[str, list[int]] = {}
             for w, (x, y, yaw) in asked:
