@@ -7,6 +7,8 @@ import pytest
 
 import nuno
 from nuno.errors import BodyStateError, InvalidInputError
+from nuno.shapes.path import path_as_it_is
+from nuno.tables.kinematic_motion import paths_at
 
 TURN = (np.cos(0.4), 0.0, 0.0, np.sin(0.4))
 
@@ -47,6 +49,17 @@ def test_a_path_turns_a_body():
     world.run(0.3)
     np.testing.assert_allclose(plate.quaternion, path.quaternion_at(0.3), atol=1e-12)
     np.testing.assert_allclose(plate.position, path.at(0.3), atol=1e-12)
+
+
+def test_a_path_of_poses_is_at_its_keys_to_the_bit():
+    """Promise of copies: what bodies stood at is not normed anew where a path of it has ended."""
+    turns = np.array([TURN, (0.6, 0.0, 0.0, 0.8)]) * (1.0 + 1e-15)
+    places = np.array([[0.1, 0.2, 0.3], [1.0 / 3.0, 1e-3, 0.7]])
+    path = path_as_it_is(np.array([0.5, 1.0]), places, turns)
+    for time, key in ((0.2, 0), (0.5, 0), (1.0, 1), (3.0, 1)):
+        ((place, turn),) = paths_at([path], np.array(time))
+        np.testing.assert_array_equal(place, places[key])
+        np.testing.assert_array_equal(turn, turns[key])
 
 
 def test_a_move_ends_by_none_by_locate_and_by_another_path():

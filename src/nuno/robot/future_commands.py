@@ -7,6 +7,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Protocol
 
 from nuno.errors import BodyStateError
+from nuno.robot.simulated_joints import Sent
+from nuno.robot.walk_order import WalkOrder
 
 if TYPE_CHECKING:
     from nuno.robot.gait import Gait
@@ -50,9 +52,11 @@ def future_commands(robot: CommandedRobot, futures: World, k: int) -> Callable[[
     copies: Any = next((other for other in futures.drivers if getattr(other, "original", None) is robot), None)
     if copies is None:
         raise BodyStateError(f"{name!r} is not in these futures: it entered the world after they were imagined")
-    under_way, servo, sent = copies.commanded_in(k)
+    under_way, servo, given = copies.commanded_in(k)
     _, _, joints, gait = under_way
-    goes_on = robot.joints.are_as(joints)
+    goes_on, passed = robot.joints.are_as(joints), robot.joints.clock - joints[0][0]
+    sent = [own for own in given if isinstance(own, Sent)]
+    orders = [own for own in given if isinstance(own, WalkOrder)]
     if not goes_on and robot.gait.is_walking:
         raise BodyStateError(f"{name!r} walks, and these futures were imagined earlier: wait until it stands")
     if not goes_on and gait[2] is not None:
@@ -61,9 +65,11 @@ def future_commands(robot: CommandedRobot, futures: World, k: int) -> Callable[[
     def carry_out() -> None:
         if goes_on:
             robot.gait.load(gait)
+        robot.gait.follow(gait[-1], orders, 0.0 if goes_on else passed)
         if servo is not robot.saved()[2]:
             robot.servo(None if servo is None else servo.command)
-        if not robot.joints.follow(joints, sent) and servo is None and not robot.gait.is_walking:
+        moves = robot.joints.follow(joints, sent) or robot.gait.is_walking or robot.gait.awaits
+        if not moves and servo is None:
             logger.warning("%r was told nothing in future %d, and holds its joints where they are", name, k)
 
     return carry_out

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -19,8 +19,9 @@ from nuno.robot.robot_state import RobotState
 from nuno.robot.running_walk import RunningWalk, landing_after, run_on, set_off
 from nuno.robot.simulated_joints import SimulatedJoints
 from nuno.robot.walk import TimedMotion, Walk
+from nuno.robot.walk_order import SOON, Place, WalkOrder, queued
 from nuno.robot.walk_planner import MARGIN, WalkPlanner
-from nuno.robot.walking import continue_walk, plan_walk, plan_walk_velocity, stop_walk
+from nuno.robot.walk_plans import WalkPlans
 
 if TYPE_CHECKING:
     from nuno.robot.humanoid import Humanoid
@@ -29,11 +30,6 @@ logger = logging.getLogger(__name__)
 
 WALKING = ("lleg_controller", "rleg_controller")
 """The controllers whose joints a walk moves; the others go on as they are asked."""
-SOON = 1e-9
-"""[s] Rounding of sums of frames."""
-
-Place = tuple[float, float, float]
-"""x, y [m] and yaw [rad] in the world."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +51,8 @@ class Drive:
         return self.velocity if clock < self.until - SOON else np.zeros(3)
 
 
+Load = Callable[[], "tuple[float, np.ndarray] | None"]
+"""Tells what a robot carries, as ``plan_walk`` takes it."""
 Looks = Callable[[RunningWalk, float], object]
 """Tells what a robot would run into on a walk from a time [s] of it on, None for nothing."""
 
@@ -72,6 +70,8 @@ class Gait:
 
     Attributes:
         looks: Asked before a velocity is taken, where not None.
+        bears: Asked before a walk to a place is planned, where not None.
+        plans: Walks that were planned for the robot and its copies.
     """
 
     def __init__(self, robot: Humanoid, joints: SimulatedJoints) -> None:
@@ -85,12 +85,25 @@ class Gait:
         self._start = 0.0  # when the walk's own time was 0
         self._waiting: tuple[Goal, Place] | None = None  # the next goal, for when the robot stands
         self._cut = ""  # why the walk ends before its goal
+        self._later: tuple[WalkOrder, ...] = ()  # what comes after that, each as if it were told then
         self.looks: Looks | None = None
+        self.bears: Load | None = None
+        self.plans = WalkPlans()
+
+    @property
+    def awaits(self) -> bool:
+        """Return True if it is to do something later that it was told already."""
+        return bool(self._later)
 
     @property
     def is_walking(self) -> bool:
         """Return True if the robot is under way."""
         return self.walk is not None
+
+    @property
+    def newest_goal(self) -> Goal | None:
+        """The goal that it was given last, of a walk that is under way, waits or has ended; None before the first."""
+        return self.goal if self._waiting is None else self._waiting[0]
 
     @property
     def end(self) -> float:
@@ -122,7 +135,7 @@ class Gait:
             return False
         landings = {walk.schedule.landing(k) * TICK for k in range(len(walk.schedule.steps))}
         for time in (*sorted((t for t in landings if now < t < hit - self._start), reverse=True), now):
-            shorter = stop_walk(walk, time)
+            shorter = self.plans.stop(walk, time)
             if meets(shorter, now) is None:
                 missed = float(np.linalg.norm(walk.configurations[-1][:2] - shorter.configurations[-1][:2]))
                 self._cut = f"{why}; the walk ends {missed:.2f} m before its goal"
@@ -134,26 +147,24 @@ class Gait:
         """Return True if the walk has the joints of a controller."""
         return self.walk is not None and controller in self.names
 
-    def plan(
-        self, robot: Humanoid, x: float, y: float, yaw: float, seconds: float | None,
-        load: tuple[float, np.ndarray] | None = None,
-    ) -> Walk | str:  # fmt: skip
-        """Return a walk from where a robot stands, or why there is none; nothing changes.
+    def go(self, goal: Goal, x: float, y: float, yaw: float, seconds: float | None) -> None:
+        """Set off at once to a place seen from here, or go on otherwise where the robot walks already.
 
         Args:
-            robot: The robot, as it stands.
+            goal: Its goal, which ends as rejected where there is no such walk.
             x: Ahead [m].
             y: To the left [m].
             yaw: Counterclockwise [rad].
             seconds: In which it covers that [s]; None as it walks by itself.
-            load: What it carries, as ``plan_walk`` takes it.
         """
-        try:
-            if seconds is None:
-                return plan_walk(robot, x, y, yaw, load=load)
-            return plan_walk_velocity(robot, x / seconds, y / seconds, yaw / seconds, seconds, load=load)
-        except NunoError as error:
-            return str(error)
+        if self.is_walking:
+            self.change(goal, x, y, yaw, seconds)
+        else:
+            self.begin(self.planned(x, y, yaw, seconds), goal)
+
+    def planned(self, x: float, y: float, yaw: float, seconds: float | None) -> Walk | str:
+        """Return the walk on which ``go`` sets off from standing, or why there is none; nothing changes."""
+        return self.plans.plan(self._robot, x, y, yaw, seconds, None if self.bears is None else self.bears())
 
     def begin(self, walk: Walk | RunningWalk | str, goal: Goal) -> None:
         """Set off on a walk that was planned, or reject the goal where there is none."""
@@ -161,10 +172,38 @@ class Gait:
             goal.finish(GoalStatus.REJECTED, text=walk)
             return
         for name in self.names:
-            self._joints.take_over(name)
+            self._joints.take_over(name, self._joints.clock + SOON)
         self.walk, self._before, self.goal, self._drive, self._cut = walk, None, goal, None, ""
         self._start = self._joints.clock - float(walk.times[0])
         goal.status = GoalStatus.ACTIVE
+
+    def follow(self, waiting: Sequence[WalkOrder], given: Sequence[WalkOrder], later: float) -> None:
+        """Carry out from now on what another gait of this robot was told, each order ``later`` [s] after it was.
+
+        Args:
+            waiting: What it was to do when it was left alone.
+            given: What it was told from then on.
+            later: [s].
+        """
+        self._later = queued(waiting, given, later)
+
+    def forget(self) -> None:
+        """Give up what is to come later: the robot is told something else."""
+        self._later = ()
+        for name in self.names:
+            self._joints.controllers[name].forget_later()
+
+    def take_up(self) -> None:
+        """Begin what is to be begun by now of what was told for later."""
+        while self._later and self._later[0].clock <= self._joints.clock + SOON:
+            order, self._later = self._later[0], self._later[1:]
+            if order.place is None:
+                self.cancel()
+                continue
+            goal = Goal(order.place)
+            self.go(goal, *order.place, order.seconds)
+            if goal.status == GoalStatus.REJECTED:
+                logger.warning("%r did not go where it went in a future: %s", self._robot.name, goal.text)
 
     def change(self, goal: Goal, x: float, y: float, yaw: float, seconds: float | None) -> None:
         """Go on otherwise from here, while the robot walks; see ``plan``."""
@@ -174,7 +213,7 @@ class Gait:
             self._waiting = (goal, place)
             return
         try:
-            changed = continue_walk(self.walk, self._next_tick(), x / seconds, y / seconds, yaw / seconds, seconds)
+            changed = self.plans.go_on(self.walk, self._next_tick(), x, y, yaw, seconds)
         except NunoError as error:
             goal.finish(GoalStatus.REJECTED, text=str(error))
             return
@@ -257,7 +296,7 @@ class Gait:
                 self._drive = replace(self._drive, velocity=np.zeros(3))
             return
         self._drive = None
-        self._before, self.walk = self.walk, stop_walk(self.walk, self._next_tick())
+        self._before, self.walk = self.walk, self.plans.stop(self.walk, self._next_tick())
 
     def at(self, clock: float) -> RobotState:
         """Return configuration, velocity and acceleration at a time [s]."""
@@ -275,7 +314,7 @@ class Gait:
         drive, self.walk = self._drive, None
         self._before = self._drive = None
         for name in self.names:
-            self._joints.take_over(name)
+            self._joints.take_over(name, -math.inf)
         assert self.goal is not None
         if drive is not None and self.goal.status == GoalStatus.ACTIVE and drive.now(self._joints.clock).any():
             self._set_off(self.goal, drive.velocity, drive.until)
@@ -305,16 +344,18 @@ class Gait:
         x, y, yaw = standing_place(self._robot)
         forward, left = place[0] - x, place[1] - y
         c, s = math.cos(yaw), math.sin(yaw)
-        self.begin(self.plan(self._robot, c * forward + s * left, c * left - s * forward, place[2] - yaw, None), goal)
+        ahead = (c * forward + s * left, c * left - s * forward, place[2] - yaw)
+        self.begin(self.plans.plan(self._robot, *ahead, None), goal)
 
     def save(self) -> tuple[Any, ...]:
         """Return all that it is, for ``load``."""
         status = None if self.goal is None else (self.goal.status, self.goal.text)
-        return self.goal, status, self.walk, self._before, self._start, self._waiting, self._drive, self._cut
+        walk = (self.walk, self._before, self._start)
+        return self.goal, status, *walk, self._waiting, self._drive, self._cut, self._later
 
     def load(self, saved: tuple[Any, ...]) -> None:
         """Become what it was; a goal that came since is given up."""
-        goal, status, self.walk, self._before, self._start, waiting, self._drive, self._cut = saved
+        goal, status, self.walk, self._before, self._start, waiting, self._drive, self._cut, self._later = saved
         if self.goal is not goal:
             self._drop("the world was restored")
         self.goal, self._waiting = goal, waiting
@@ -332,7 +373,9 @@ class Gait:
         if aborted and self.goal is not None:
             self.goal.finish(GoalStatus.ABORTED, text=why)
             for name in self.names:
-                self._joints.take_over(name)
+                self._joints.take_over(name, -math.inf)
+        else:
+            self._later = ()
         self._drop(why)
         self.walk = self._before = self._drive = None
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -12,6 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.errors import BodyStateError, InvalidInputError, RobotModelError
+from nuno.robot.goal import Goal
+from nuno.robot.imagined_base import ImaginedBase
 from nuno.robot.imagined_sensors import ImaginedReadings, ImaginedSensors
 from nuno.robot.link_batch import LinkBatch
 from nuno.robot.motion_batch import MotionBatch
@@ -19,11 +22,13 @@ from nuno.robot.motion_guard import MotionGuard
 from nuno.robot.robot_state import RobotState, RobotStates
 from nuno.robot.simulated_joints import Sent
 from nuno.robot.trajectory import JointTrajectory, passing_velocities
+from nuno.robot.walk_order import WalkOrder
 from nuno.robot.wanted_motion import WantedMotion
 from nuno.validation import checked, finite_array, number
 
 if TYPE_CHECKING:
     from nuno.robot.balance import Balance
+    from nuno.robot.gait import Gait
     from nuno.robot.humanoid import Humanoid
     from nuno.robot.links import Links
     from nuno.robot.reported_joints import Angles
@@ -35,6 +40,9 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
+STILL = 1e-6
+"""[rad] What is asked of a leg's joint that is to stay where it is."""
+
 
 class OriginalRobot(Protocol):
     """The robot that is imagined, as its copies see it; `SimulatedRobot` says what each member is."""
@@ -43,6 +51,7 @@ class OriginalRobot(Protocol):
     wanted: Humanoid
     links: Links
     joints: SimulatedJoints
+    gait: Gait
     guard: MotionGuard
     balance: Balance | None
     sensors: Sensors
@@ -63,7 +72,7 @@ class OriginalRobot(Protocol):
         """Return the difference of two postures."""
 
 
-class ImaginedRobot:
+class ImaginedRobot(ImaginedBase):
     """A robot in every world of a batch: ``world.imagine(n).robot``.
 
     What is under way in the robot's world goes on in each of them. Commands may differ from world to world. Sensors are
@@ -88,7 +97,9 @@ class ImaginedRobot:
         state, motion, self._servo, found = original.saved() if of is None else of[0].saved_of(of[1])
         # what is under way as the robot itself is imagined, and what each copy was sent since
         self._under_way: Any = motion if of is None else of[0]._under_way
-        self._sent: list[tuple[Sent, ...]] = [() if of is None else of[0]._sent[of[1]]] * world.world_count
+        self._sent: list[tuple[Sent | WalkOrder, ...]] = [() if of is None else of[0]._sent[of[1]]] * world.world_count
+        self._warned_of_legs = False
+        self._base_goals: list[Goal | None] = [None] * world.world_count  # of walks that were refused
         self._links = [world.find(body.name) for body in original.links.bodies]
         self.balance: Balance | None = None
         if original.balance is not None and (original.is_dynamic if of is None else of[0].balance is not None):
@@ -96,10 +107,11 @@ class ImaginedRobot:
         self._states: list[RobotState] = [state] * world.world_count
         groups = {name: own.names for name, own in original.joints.controllers.items()}
         self._motions = []
-        for _ in range(world.world_count):
+        for k in range(world.world_count):
             own = WantedMotion(original.wanted.copy(), groups, world.time)
             own.load(motion)
             own.disown()
+            own.gait.plans, own.gait.bears = original.gait.plans, partial(self._carried, k)
             for name, controller in own.joints.controllers.items():
                 controller.near = original.joints.controllers[name].near
             self._motions.append(own)
@@ -147,8 +159,7 @@ class ImaginedRobot:
             BodyStateError: a link was removed from the batch.
         """
         with self.world.lock:
-            if not self._is_whole():
-                raise BodyStateError(f"the copies of {self.original.actual.name!r} lack links; imagine the batch anew")
+            self._check_whole()
             if self._read is None or self._read.time != self.world.time:
                 if self._sensors is None:
                     own = self.original
@@ -182,7 +193,7 @@ class ImaginedRobot:
         Raises:
             InvalidInputError: angles of other shapes, or not finite.
             UnknownNameError: no joint of that name.
-            BodyStateError: the robot walks or is under a servo command.
+            BodyStateError: the robot is under a servo command.
         """
         with self.world.lock:
             worlds = self.world.world_count
@@ -212,7 +223,7 @@ class ImaginedRobot:
 
         Raises:
             InvalidInputError: other shapes, not finite, or times that are not positive.
-            BodyStateError: the robot walks or is under a servo command.
+            BodyStateError: the robot is under a servo command.
         """
         with self.world.lock:
             worlds, count = self.world.world_count, len(self.joint_names)
@@ -224,20 +235,30 @@ class ImaginedRobot:
 
     def _send(self, wanted: np.ndarray, spans: np.ndarray) -> None:
         """Send each world's joints through angles (worlds, k, n), each of which takes a span (k,) [s]."""
-        if self._servo is not None or any(own.gait.is_walking for own in self._motions):
-            raise BodyStateError(f"{self.original.actual.name!r} walks or is under a servo command there")
+        if self._servo is not None:
+            raise BodyStateError(f"{self.original.actual.name!r} is under a servo command there")
         self._together.bring()
-        shortest = self.original.angle_vector_duration
+        shortest, kept = self.original.angle_vector_duration, []
         for k, (own, begin, goals) in enumerate(zip(self._motions, self._present(), wanted, strict=True)):
             steps = np.array([self.original.sub_angle_vector(b, a) for a, b in pairwise((begin, *goals))])
             needed = [shortest(a, b) for a, b in pairwise((begin, *goals))]
             longer = np.maximum(spans, needed)  # as the driver stretches what is too fast
             speeds, times = passing_velocities(steps, longer), np.cumsum(longer)
             for name, rows in own.joints.rows.items():
+                if own.gait.moves(name):
+                    if np.abs(goals[:, rows] - begin[rows]).max() > STILL:
+                        kept.append(k)
+                    continue
                 names = own.joints.controllers[name].names
                 trajectory = JointTrajectory(names, times, goals[:, rows], speeds[:, rows])
                 own.joints.send(name, trajectory)
                 self._sent[k] += (Sent(own.joints.clock, name, trajectory),)
+        if kept and not self._warned_of_legs:
+            self._warned_of_legs = True
+            logger.warning(
+                "%r walks in worlds %s: its legs are the walk's there, and go nowhere else before it stands (go_stop)",
+                self.original.actual.name, sorted(set(kept)),
+            )  # fmt: skip
 
     def _present(self) -> np.ndarray:
         """Return where the joints are (worlds, n), as encoders tell the driver, which plans from there."""
@@ -252,7 +273,7 @@ class ImaginedRobot:
         found = self._guards[world].save() if self._guards else None
         return self._states[world], self._motions[world].save(), self._servo, found
 
-    def commanded_in(self, world: int) -> tuple[Any, Any, tuple[Sent, ...]]:
+    def commanded_in(self, world: int) -> tuple[Any, Any, tuple[Sent | WalkOrder, ...]]:
         """Return what was under way as the robot was imagined, its servo command, and what a copy was sent since."""
         return self._under_way, self._servo, self._sent[world]
 
@@ -311,13 +332,13 @@ class ImaginedRobot:
         joints = () if self.balance is None else self.balance.dynamics.save()
         found = [guard.save() for guard in self._guards]
         self._together.bring()
-        motions, sent = [own.save() for own in self._motions], list(self._sent)
-        return list(self._states), motions, joints, self._servo, found, sent
+        motions, given = [own.save() for own in self._motions], (list(self._sent), list(self._base_goals))
+        return list(self._states), motions, joints, self._servo, found, given
 
     def load(self, saved: Any) -> None:
         """Become what it was when a snapshot was taken."""
-        states, motions, joints, self._servo, found, sent = saved
-        self._states, self._read, self._sent = list(states), None, list(sent)
+        states, motions, joints, self._servo, found, (sent, refused) = saved
+        self._states, self._read, self._sent, self._base_goals = list(states), None, list(sent), list(refused)
         self._together.forget()
         for own, motion in zip(self._motions, motions, strict=True):
             own.load(motion)

@@ -74,6 +74,8 @@ class MotionBatch:
         Those are worked out in which no copy must be asked.
         """
         self._ahead = ahead = FramesAhead(start)
+        if any(own.gait.awaits for own in self._motions):
+            return 1
         ends = ends[: max(1, AT_ONCE // len(self._motions))]
         joints, everyone = self._prepared(), np.ones(len(self._motions), dtype=bool)
         kept = joints.clock.copy(), joints.motion, joints.desired
@@ -135,6 +137,10 @@ class MotionBatch:
             states: How copies with dynamics move now.
         """
         self._asked, self._pending, self._worked_out = list(range(len(self._motions))), (), ()
+        if any(own.gait.awaits for own in self._motions):
+            self.bring()
+            for own in self._motions:
+                own.gait.take_up()
         if span <= 0.0:
             self.bring()
             self.aims = [own.begin(end, span) for own in self._motions]

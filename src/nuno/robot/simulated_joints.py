@@ -231,9 +231,12 @@ class SimulatedJoints:
         self.controllers[name].cancel(self.positions[self.rows[name]])
         self._ask(name)
 
-    def take_over(self, name: str) -> None:
-        """Let something else move a controller's joints, or give them back: it holds them where they are now."""
-        self.controllers[name].move_rest(self.positions[self.rows[name]])
+    def take_over(self, name: str, after: float = np.inf) -> None:
+        """Let something else move a controller's joints, or give them back: it holds them where they are now.
+
+        What it was sent for later than ``after`` [s] comes all the same.
+        """
+        self.controllers[name].move_rest(self.positions[self.rows[name]], after)
         self._ask(name)
 
     def send(

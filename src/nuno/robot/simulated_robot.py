@@ -23,12 +23,11 @@ from nuno.robot.robot_state import RobotState
 from nuno.robot.sensor_model import SensorModel
 from nuno.robot.sensors import Readings, Sensors
 from nuno.robot.servo import Servo, ServoCommand, external_forces
-from nuno.robot.simulated_body import SimulatedBody
+from nuno.robot.simulated_base import SimulatedBase
 from nuno.robot.simulated_cameras import SimulatedCameras
 from nuno.robot.simulated_gripper import SimulatedGripper
 from nuno.robot.trajectory import JointTrajectory
 from nuno.robot.wanted_motion import WantedMotion
-from nuno.shapes.coordinates import Coordinates
 from nuno.validation import checked, number
 from nuno.world.pace import LATE
 
@@ -39,7 +38,7 @@ if TYPE_CHECKING:
     from nuno.world.world import World
 
 
-class SimulatedRobot(SimulatedBody):
+class SimulatedRobot(SimulatedBase):
     """A robot whose links stand in a world and move there in every frame, as its controllers want.
 
     All waiting steps the world: at full speed, or paced by ``real_time_factor``; where the world runs in the background
@@ -109,7 +108,7 @@ class SimulatedRobot(SimulatedBody):
         self._cameras = SimulatedCameras(self.links, cameras)
         self.loads = LinkLoads(self.links)
         self.guard, self._burden = MotionGuard(self.links, collisions), Burden(self.actual, self.links)
-        self.gait.looks = self.guard.velocities_of(self._motion)
+        self.gait.looks, self.gait.bears = self.guard.velocities_of(self._motion), self._carried
         self._servo: Servo | None = None
         self._before: RobotState | None = None  # its state when the frame began
         self._due = wall_clock.perf_counter()
@@ -237,51 +236,7 @@ class SimulatedRobot(SimulatedBody):
             raise UnknownNameError("controller", name, list(self.joints.controllers))
         return str(name)
 
-    # Base, hands and sensors
-
-    def read_base(self) -> Coordinates:
-        """Return where the base link is in the world."""
-        with self.world.lock:
-            return self.actual.copy_coords()
-
-    def send_base(self, x: float, y: float, yaw: float, seconds: float | None, stop: bool) -> Goal:
-        """Let the robot walk to a place seen from where it stands; see ``RobotInterface``.
-
-        A walk always ends standing, whatever ``stop`` says; another velocity that is sent before goes on from it.
-        """
-        goal = Goal((x, y, yaw))
-        with self.world.lock:
-            self._check_there()
-            if self.gait.is_walking:
-                self.gait.change(goal, x, y, yaw, seconds)
-                return goal
-            standing, load = self.wanted.copy(), self._load()
-        walk = self.gait.plan(standing, x, y, yaw, seconds, load)  # the world goes on meanwhile
-        with self.world.lock:
-            if self.gait.is_walking:
-                goal.finish(GoalStatus.REJECTED, text="another walk was begun meanwhile")
-            else:
-                self.gait.begin(walk, goal)
-        return goal
-
-    def _load(self) -> Any:
-        """Return what the robot carries as ``plan_walk`` takes it, None without dynamics."""
-        if self.balance is None or not self.is_dynamic:
-            return None
-        carried = self.balance.load(self._state)
-        return None if carried is None else carried.seen_from(self.actual)
-
-    def send_velocity(self, x: float, y: float, yaw: float, hold: float = 1.0) -> Goal:
-        """Let the robot keep a velocity, the newest from each landing of a foot; see ``RobotInterface``."""
-        with self.world.lock:
-            self._check_there()
-            x, y, yaw = (number(name, value) for name, value in (("x", x), ("y", y), ("yaw", yaw)))
-            return self.gait.drive(x, y, yaw, number("hold", hold, above=0.0))
-
-    def cancel_base(self) -> None:
-        """Let the robot come to rest as soon as that is safe."""
-        with self.world.lock:
-            self.gait.cancel()
+    # Hands
 
     def send_gripper(self, hand: str, position: float, effort: float) -> Goal:
         """Open or close a hand; see ``RobotInterface``.
@@ -301,6 +256,7 @@ class SimulatedRobot(SimulatedBody):
 
     def begin_frame(self, start: float, end: float) -> None:
         """Send the links to where the robot is at the end of the frame, or, with dynamics, set their motors."""
+        self.gait.take_up()
         span, before, self._before = end - start, self._motion.aim, self._state
         servo = None if self._servo is None or self.is_dynamic else self._serve
         if span > 0.0 and not self.is_dynamic:
@@ -388,6 +344,7 @@ class SimulatedRobot(SimulatedBody):
                 grippers = {name: gripper.save() for name, gripper in self.grippers.items()}
                 self.load((state, motion, joints, grippers, servo, guard, self._burden.save()))
                 self._motion.disown()
+                self._base_goal = self.gait.goal
 
     def future_commands(self, futures: World, k: int) -> Callable[[], None]:
         """Return what lets the robot do from now on what its copy in one world of a batch was told to."""

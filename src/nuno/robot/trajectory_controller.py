@@ -189,17 +189,28 @@ class TrajectoryController:
 
     def cancel(self, positions: np.ndarray) -> None:
         """Give the goal up, and hold the joints at positions (m,)."""
+        self._later = ()
         self.hold(positions, GoalStatus.PREEMPTED, None, "it was cancelled")
 
     def hold(self, positions: np.ndarray, status: GoalStatus, code: int | None, text: str) -> None:
-        """End the goal, and hold the joints at positions (m,)."""
+        """End the goal, and hold the joints at positions (m,) until something comes that was sent for later."""
         if self.goal is not None:
             self.goal.finish(status, code, text)
-        self._spline, self._next, self._later = None, None, ()
+        self._spline, self._next = None, None
         self.piece = Piece(0.0, np.inf, resting_at(np.array(positions)))
 
-    def move_rest(self, positions: np.ndarray) -> None:
-        """Hold the joints at positions (m,) that something else has brought them to; a goal under way is aborted."""
+    def forget_later(self) -> None:
+        """Give up what was sent for later."""
+        self._later = ()
+
+    def move_rest(self, positions: np.ndarray, after: float = np.inf) -> None:
+        """Hold the joints at positions (m,) that something else has brought them to; a goal under way is aborted.
+
+        Args:
+            positions: (m,).
+            after: Of what was sent for later, all that is to begin after that time [s] is kept.
+        """
+        self._later = tuple(own for own in self._later if own.start > after)
         self.hold(positions, GoalStatus.ABORTED, ResultCode.INVALID_GOAL, "the joints are moved by something else")
 
     def advance(self, time: float, tells: bool = True) -> bool:

@@ -122,7 +122,7 @@ class WantedMotion:
         robot.move_to(np.clip(robot.angles_of(q), *robot.joint_limits), q[:7])
         self.joints.put_rows(rows, robot.angle_vector())
         for name in self.gait.names:
-            self.joints.take_over(name)
+            self.joints.take_over(name, -np.inf)
         nothing = np.zeros(robot.model.nv)
         v = nothing.copy()
         v[6:] = self.joints.velocities

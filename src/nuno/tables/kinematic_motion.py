@@ -122,6 +122,12 @@ def paths_at(paths: Sequence[Path | None], times: np.ndarray) -> list[tuple[np.n
         alike = [path for k in group if (path := paths[k]) is not None]
         first, last, s = alike[0].keys_around(times)
         places = np.stack([path.positions for path in alike])
+        if s.ndim == 0 and s in (0.0, 1.0):  # at a key, as it is: so a path batch has it, of which one world was taken
+            key = int(first if s == 0.0 else last)
+            for k, path in zip(group, alike, strict=True):
+                turn = None if path.quaternions is None else path.quaternions[..., key, :]
+                found[k] = (path.positions[..., key, :], turn)
+            continue
         a, b = places[..., first, :], places[..., last, :]
         placed = a + s[..., None] * (b - a)
         turns = [path.quaternions for path in alike if path.quaternions is not None]
