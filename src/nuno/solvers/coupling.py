@@ -14,6 +14,7 @@ from nuno.coupled.contact_geometry import measure_rows
 from nuno.coupled.contact_rows import Rows
 from nuno.coupled.coupled_passes import Layout, add_impulses, collect, end_contacts, scatter, solve
 from nuno.coupled.drive_constraints import UNDECIDED
+from nuno.coupled.joint_closing import close_joints, limp_joints
 from nuno.coupled.joint_opening import Trees
 from nuno.coupled.joint_response import Joints
 from nuno.coupled.kept_multipliers import kept_room, more_kept_room
@@ -82,10 +83,10 @@ class Coupling(CouplingResults):
         self._solvers, self._rigid, self._slots = list(solvers), rigid, list(slots)
         self._elements, self._ties, self.holds, self.joints = elements, ties, holds, joints
         self._trees = trees
-        self._scale = self._rate = 0.0
-        self._row_count = 0
+        self._scale, self._rate, self._row_count = 0.0, 0.0, 0
         first = rigid if rigid is not None else solvers[0]
         self.device, self.world_count = str(first.device), int(first.world_count)
+        self._limp = limp_joints(joints, self.world_count, self.device)
         self._threads = BLOCK_THREADS if self.device.startswith("cuda") else 1
         self._at_once = solves_at_once(self.device)
         self._launches = RecordedLaunches(self.device, BLOCK_THREADS)
@@ -230,8 +231,7 @@ class Coupling(CouplingResults):
             for name in ("total", "total_twist", "total_axial", "unmet"):
                 getattr(self.joints, name).zero_()
             self.joints.state.fill_(UNDECIDED)
-        self._rate = 1.0 / (dt * dt)
-        self._scale = self._rate / substeps
+        self._rate, self._scale = 1.0 / (dt * dt), 1.0 / (dt * dt) / substeps
         # what diverges is told of after the run
         speeds = np.nan_to_num(self._speeds(), nan=FAST, posinf=FAST)
         reaches = 2.0 * (QUICKER * np.minimum(speeds, FAST) + 10.0 * duration + 0.1) * dt
@@ -256,6 +256,9 @@ class Coupling(CouplingResults):
                 solver.end_substep(k)
             if self._rigid is not None:
                 self._rigid.finish()
+            if self.joints.count:
+                tied: list[Any] = [self._state, self.joints, self._limp, self._trees, self._passing, dt, self._threads]
+                self._launches.launch_worlds(close_joints, self.world_count, self._threads, tied)
 
     def _place_ties(self) -> None:
         """Bring the places to which ties are led, relative to what all places of an island are relative to."""
