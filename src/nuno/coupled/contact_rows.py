@@ -63,6 +63,23 @@ class Rows:
 VERTEX_TRIANGLE, EDGE_EDGE, VERTEX_RIGID, TRIANGLE_RIGID, EDGE_RIGID = 0, 1, 2, 3, 4
 
 
+def row_room(worlds: int, room: int, device: str) -> Rows:
+    """Return room for ``room`` rows a world, of which none is used."""
+    made = Rows()
+    made.room = room
+    made.count = wp.zeros(worlds, dtype=int, device=device)
+    made.active_count = wp.zeros(worlds, dtype=int, device=device)
+    kinds = {
+        "corners": wp.vec4i, "kind": int, "slot": int, "part": int, "bodies": wp.vec2i, "point": wp.vec3,
+        "weights": wp.vec4, "normal": wp.vec3, "distance": float, "friction": float, "compliance": float,
+        "squeeze": float, "push": float, "drag": wp.vec3, "next": int, "mate": int, "sharing": int,
+        "push_change": float, "drag_change": wp.vec3, "active": int,
+    }  # fmt: skip
+    for name, dtype in kinds.items():
+        setattr(made, name, wp.zeros(worlds * room, dtype=dtype, device=device))
+    return made
+
+
 @wp.func
 def blend(x: wp.array(dtype=wp.vec3), first: int, corners: wp.vec4i, weights: wp.vec4):
     """The weighted sum of a row's particles."""

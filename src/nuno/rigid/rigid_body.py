@@ -36,7 +36,7 @@ class RigidState:
     inverse_inertia: wp.array(dtype=wp.mat33)
     weight: wp.array(dtype=float)  # the inverse mass in this run [1/kg], negative once a hold says where it is
     give: wp.array(dtype=wp.mat33)  # the inverse inertia in this run, world frame, of where the substep began
-    joined: wp.array(dtype=int)  # 1 once joints say where it is in this substep
+    joined: wp.array(dtype=int)  # 1 once joints say where it is in this substep, 2: see `note_parted`
 
 
 @wp.func

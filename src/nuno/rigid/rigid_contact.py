@@ -33,6 +33,9 @@ REST = wp.constant(2.0e-5)
 """[m] Overlap that is left alone: mending the last of it would open gaps beside it, and nothing would rest."""
 PART_SPEED = wp.constant(0.5)
 """[m/s] What overlaps parts no faster, so that a bad start is no explosion."""
+DEEP = wp.constant(2.0e-3)
+"""[m] Overlap from which on joints are closed after it was parted: see `nuno.coupled.joint_closing`. Feet that land
+come less deep, 1.4 mm at most in a walk of Talos."""
 
 
 @wp.func
@@ -244,6 +247,20 @@ def note_impulse(parts: Parts, c: Contacts, m: Meeting, e: int, dt: float):
 
 
 @wp.func
+def begin_mending(s: RigidState, i: int):
+    """Keep where a body is before `mend_entry` parts what overlaps."""
+    s.position_free[i] = s.position[i]
+    s.rotation_free[i] = s.rotation[i]
+
+
+@wp.func
+def note_parted(s: RigidState, i: int, weight: float):
+    """Note that a body was taken out of an overlap by itself, if joints say where it is."""
+    if weight > 0.0 and s.joined[i] != 0:
+        s.joined[i] = 2
+
+
+@wp.func
 def mend_entry(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, dt: float, still: float):
     """Positions alone: take back a share of what overlaps, and of what slipped though friction held it.
 
@@ -252,7 +269,7 @@ def mend_entry(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, dt:
     m = meeting_of(s, parts, c, world, e)
     note_impulse(parts, c, m, e, dt)
     # a light body on a joint would go aside for a heavy one on it, and a motor or friction would not bring it back
-    stays = s.joined[m.i] != s.joined[m.j] and wp.min(m.wa, m.wb) > 0.0
+    stays = (s.joined[m.i] != 0) != (s.joined[m.j] != 0) and wp.min(m.wa, m.wb) > 0.0
     if stays:
         if s.joined[m.i] != 0:
             m.wa = 0.0
@@ -261,6 +278,8 @@ def mend_entry(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, dt:
             m.wb = 0.0
             m.ib = wp.mat33(0.0)
     g = places_of(s, m)
+    before = free_places_of(s, m)
+    deep = int(0)
     for h in range(c.count[e]):
         k = c.count[e] - 1 - h
         o = e * POINTS + k
@@ -275,7 +294,11 @@ def mend_entry(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, dt:
         gap = start[0] + wp.dot(m.n, went)
         back = wp.vec3(0.0)
         if gap < -REST:
-            back = wp.min(-MEND * (gap + REST), PART_SPEED * dt) * mass[0] * m.n
+            # of all entries together: what other points have parted it by counts
+            parted = wp.dot(m.n, went - against(before, ra, rb))
+            back = wp.max(wp.min(-MEND * (gap + REST), PART_SPEED * dt - wp.max(parted, 0.0)), 0.0) * mass[0] * m.n
+            if gap < -DEEP:
+                deep = 1
         if f[0] > 0.0 and not is_slipping(f, c.friction[e]):
             back = back - MEND * (start[1] + wp.dot(m.t, went)) * mass[1] * m.t
             back = back - MEND * (start[2] + wp.dot(m.u, went)) * mass[2] * m.u
@@ -288,3 +311,6 @@ def mend_entry(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, dt:
             g.tb = g.tb - m.ib * wp.cross(rb, back)
             g.changed = 1
     keep_places(s, m, g)
+    if deep == 1 and g.changed == 1:
+        note_parted(s, m.i, m.wa)
+        note_parted(s, m.j, m.wb)

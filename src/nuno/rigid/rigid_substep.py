@@ -29,7 +29,7 @@ from nuno.rigid.broad_phase import (
 from nuno.rigid.convex import Parts
 from nuno.rigid.persistent_manifolds import COLOURS, COUNTS, ENTRIES, LEFT, OVERFLOW, Contacts, forget_impulses
 from nuno.rigid.rigid_body import RigidState, begin_body, move_body, push_body, read_velocity
-from nuno.rigid.rigid_contact import aim_entry, mend_entry, part_entry, slow_entry, start_entry
+from nuno.rigid.rigid_contact import aim_entry, begin_mending, mend_entry, part_entry, slow_entry, start_entry
 from nuno.rigid.solve_order import line_up, sort_colours
 
 
@@ -122,6 +122,9 @@ def finish_worlds(
             for k in range(c.bounds[order + r] + rank, c.bounds[order + r + 1], size):
                 slow_entry(s, parts, c, world, c.order[order + k], run.dt, m % 2)
             wait_for(crew)
+    for k in range(rank, s.capacity, size):
+        begin_mending(s, base + k)
+    wait_for(crew)
     for r in range(c.counts[world * COUNTS + COLOURS]):
         for k in range(c.bounds[order + r] + rank, c.bounds[order + r + 1], size):
             mend_entry(s, parts, c, world, c.order[order + k], run.dt, still)

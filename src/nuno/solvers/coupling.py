@@ -12,9 +12,10 @@ import warp as wp
 from nuno.coupled.bounded_particles import MOST, Particles
 from nuno.coupled.contact_candidates import Elements, bound_triangles, keep_rows, list_rows
 from nuno.coupled.contact_geometry import measure_rows
-from nuno.coupled.contact_rows import Rows
+from nuno.coupled.contact_rows import Rows, row_room
 from nuno.coupled.coupled_passes import Layout, add_impulses, collect, end_contacts, scatter, solve
 from nuno.coupled.drive_constraints import UNDECIDED
+from nuno.coupled.joint_closing import close_joints, limp_joints
 from nuno.coupled.joint_opening import Trees
 from nuno.coupled.joint_response import Joints
 from nuno.coupled.kept_multipliers import kept_room, more_kept_room
@@ -79,6 +80,7 @@ class Coupling(CouplingResults):
         self._scale, self._rate, self._row_count = 0.0, 0.0, 0
         first = rigid if rigid is not None else solvers[0]
         self.device, self.world_count = str(first.device), int(first.world_count)
+        self._limp = limp_joints(joints, self.world_count, self.device)
         self._threads = BLOCK_THREADS if self.device.startswith("cuda") else 1
         self._at_once = solves_at_once(self.device)
         self._launches = RecordedLaunches(self.device, BLOCK_THREADS)
@@ -103,7 +105,7 @@ class Coupling(CouplingResults):
         self._touches_itself = elements.touch.numpy()[:: self._bodies + 1][: self._bodies] != 0
         tied = set(ties.body.numpy()[: ties.count].tolist())
         self._is_tied = np.array([k in tied for k in range(self._bodies)])
-        self._rows = self._row_room(4 * total + 512)
+        self._rows = row_room(self.world_count, 4 * total + 512, self.device)
         room = 0 if self._at_once or rigid is None else self._rows.room
         self._multipliers = kept_room(self.world_count, total if room else 0, room, self.device)
         self._kept = wp.zeros(self.world_count, dtype=int, device=self.device)
@@ -135,21 +137,6 @@ class Coupling(CouplingResults):
                 zeros(worlds * capacity * k, kind) for k, kind in ((1, int), (1, int), (6, wp.int64))
             )
         return made
-
-    def _row_room(self, room: int) -> Rows:
-        rows, worlds = Rows(), self.world_count
-        rows.room = room
-        rows.count = wp.zeros(worlds, dtype=int, device=self.device)
-        rows.active_count = wp.zeros(worlds, dtype=int, device=self.device)
-        kinds = {
-            "corners": wp.vec4i, "kind": int, "slot": int, "part": int, "bodies": wp.vec2i, "point": wp.vec3,
-            "weights": wp.vec4, "normal": wp.vec3, "distance": float, "friction": float, "compliance": float,
-            "squeeze": float, "push": float, "drag": wp.vec3, "next": int, "mate": int, "sharing": int,
-            "push_change": float, "drag_change": wp.vec3, "active": int,
-        }  # fmt: skip
-        for name, dtype in kinds.items():
-            setattr(rows, name, wp.zeros(worlds * room, dtype=dtype, device=self.device))
-        return rows
 
     def _layout(self, k: int) -> Layout:
         solver, made = self._solvers[k], Layout()
@@ -222,11 +209,11 @@ class Coupling(CouplingResults):
             for name in ("total", "total_twist", "total_axial", "unmet"):
                 getattr(self.joints, name).zero_()
             self.joints.state.fill_(UNDECIDED)
-        self._rate = 1.0 / (dt * dt)
-        self._scale = self._rate / substeps
+        self._rate, self._scale = 1.0 / (dt * dt), 1.0 / (dt * dt) / substeps
         if not (self._solvers or self._at_once):
             joined = partial(self._joined, dt) if self._ties.count or self.holds.count or self.joints.count else None
-            self._parts.run_frame(self._rigid, dt, substeps, joined, partial(self._touching, dt))
+            closed = partial(self._closed, dt) if self.joints.count else None
+            self._parts.run_frame(self._rigid, dt, substeps, joined, partial(self._touching, dt), closed)
             return
         # what diverges is told of after the run
         speeds = np.nan_to_num(self._speeds(), nan=FAST, posinf=FAST)
@@ -251,6 +238,8 @@ class Coupling(CouplingResults):
                 solver.end_substep(k)
             if self._rigid is not None:
                 self._rigid.finish()
+            if self.joints.count:
+                self._launches.launch_worlds(close_joints, self.world_count, self._threads, self._closed(dt))
 
     def _place_ties(self) -> None:
         """Bring the places to which ties are led, relative to what all places of an island are relative to."""
@@ -345,6 +334,10 @@ class Coupling(CouplingResults):
         """Return what `end_contacts` takes."""
         return [self._state, *self._manifolds(), self.joints, self._passing, dt, self._threads]
 
+    def _closed(self, dt: float) -> list[Any]:
+        """Return what `close_joints` takes."""
+        return [self._state, self.joints, self._limp, self._trees, self._passing, dt, self._threads]
+
     def _manifolds(self) -> tuple[Parts, Contacts]:
         """The rigid bodies' contacts with each other, which may be in new arrays since the last substep."""
         return (Parts(), Contacts()) if self._rigid is None else (self._rigid.table.parts, self._rigid.manifolds)
@@ -379,7 +372,8 @@ class Coupling(CouplingResults):
             self._row_count = int(self._rows.count.numpy().max())
             if self._row_count <= self._rows.room:
                 return
-            before, self._rows = self._rows, self._row_room(self._row_count + self._row_count // 2)
+            longer = row_room(self.world_count, self._row_count + self._row_count // 2, self.device)
+            before, self._rows = self._rows, longer
             if self._multipliers.room:
                 self._multipliers = more_kept_room(self._multipliers, self.world_count, self._rows.room)
             if not from_start:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from nuno.coupled.coupled_passes import end_contacts, solve
+from nuno.coupled.joint_closing import close_joints
 from nuno.plans.cpu_threads import run_together
 from nuno.plans.recorded_launches import RecordedLaunches, parts_of
 from nuno.rigid.persistent_manifolds import LEFT, OVERFLOW
@@ -66,7 +67,7 @@ class RigidParts:
 
     def run_frame(
         self, rigid: RigidSolver, dt: float, substeps: int, joined: Callable[[float], Sequence[Any]] | None,
-        contacts: Callable[[], Sequence[Any]],
+        contacts: Callable[[], Sequence[Any]], closed: Callable[[], Sequence[Any]] | None,
     ) -> None:  # fmt: skip
         """Go through the substeps of a frame.
 
@@ -76,6 +77,7 @@ class RigidParts:
             substeps: Their number.
             joined: Returns what `solve` takes where so much of the frame is over; None where nothing is joined.
             contacts: Returns what `end_contacts` takes.
+            closed: Returns what `close_joints` takes; None where there are no joints.
         """
         for settings, frame in zip(self._settings, (1, 0), strict=True):
             rigid.write_settings(settings, dt, frame)
@@ -84,14 +86,15 @@ class RigidParts:
             # what launches take is in other arrays once there is more room
             solved = [] if joined is None else [joined((k + 1) / substeps) for k in range(substeps)]
             for part in left:
-                self._record(part, rigid, substeps, solved, contacts())
+                self._record(part, rigid, substeps, solved, contacts(), None if closed is None else closed())
             run_together([part.go_on for part in left])
             left = [part for part in left if part.stopped]
             if left:
                 rigid.make_room()
 
     def _record(
-        self, part: _Part, rigid: RigidSolver, substeps: int, solved: Sequence[Any], contacts: Sequence[Any]
+        self, part: _Part, rigid: RigidSolver, substeps: int, solved: Sequence[Any], contacts: Sequence[Any],
+        closed: Sequence[Any] | None,
     ) -> None:  # fmt: skip
         """Set the launches of a part."""
 
@@ -105,6 +108,8 @@ class RigidParts:
 
         predict = [phase("predict", k == 0) for k in range(min(2, substeps))]
         ends = [recorded(end_contacts, contacts, None), phase("finish", False)]
+        if closed is not None:
+            ends.append(recorded(close_joints, closed, None))
         solves = [[recorded(solve, inputs, k)] for k, inputs in enumerate(solved)] or [[]] * substeps
         part.counts = rigid.counts()[slice(*part.worlds)]
         part.substeps = [(predict[min(k, 1)], *own, *ends) for k, own in enumerate(solves)]
