@@ -8,7 +8,8 @@ from typing import Any
 import warp as wp
 
 from nuno.contact.self.block_rebuild import rebuild_by_block
-from nuno.contact.self.cpu_search import list_world, make_inner_list_of_world, reach_world
+from nuno.contact.self.cpu_inner_lists import make_inner_list_of_world, reach_world
+from nuno.contact.self.cpu_search import list_world
 from nuno.contact.self.neighbour_lists import FORGET, INNER_AHEAD, swept
 from nuno.numbers.crew import shares_work
 from nuno.numbers.element_access import at, put
