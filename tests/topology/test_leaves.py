@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from nuno.topology.cloth_topology import ClothTopology
-from nuno.topology.leaves import LARGEST_REGION, SMALLEST_REGION, crease_ends, region_leaves
+from nuno.topology.leaves import MAX_REGION, MIN_REGION, crease_ends, region_leaves
 
 
 @pytest.mark.parametrize("cells", [(4, 4), (15, 11), (5, 17)])
@@ -28,4 +28,4 @@ def test_regions_have_every_vertex() -> None:
         leaves = ClothTopology.sheet(cells, (0.6, 0.5)).leaves
         assert len(np.unique(leaves.region_corner)) == (cells[0] + 1) * (cells[1] + 1)
         assert len(leaves.region_start) - 1 == -(-leaves.count // region_leaves(leaves.count))
-    assert [region_leaves(count) for count in (1, 128, 256, 10_000)] == [SMALLEST_REGION, 4, 8, LARGEST_REGION]
+    assert [region_leaves(count) for count in (1, 128, 256, 10_000)] == [MIN_REGION, 4, 8, MAX_REGION]

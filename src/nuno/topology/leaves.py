@@ -14,7 +14,7 @@ LEAF_VERTICES = 4
 """Vertices of a block, at most."""
 
 
-SMALLEST_REGION, LARGEST_REGION = 4, 16
+MIN_REGION, MAX_REGION = 4, 16
 """Consecutive leaves whose displacements are looked at together, to tell how long a list is good: finer regions tell it
 longer, and each is asked beside each other."""
 REGIONS = 32
@@ -29,7 +29,7 @@ LOWER_RIGHT = 5
 
 def region_leaves(leaves: int) -> int:
     """Return how many consecutive leaves of so many make a region; the last one may have fewer."""
-    return min(max(leaves // REGIONS, SMALLEST_REGION), LARGEST_REGION)
+    return min(max(leaves // REGIONS, MIN_REGION), MAX_REGION)
 
 
 def crease_ends(columns: int) -> tuple[tuple[int, int], ...]:

@@ -3,7 +3,7 @@
 import warp as wp
 
 from nuno.contact.self.simd_tests import PRELUDE
-from nuno.topology.leaves import LARGEST_REGION, REGIONS, SMALLEST_REGION, crease_ends
+from nuno.topology.leaves import MAX_REGION, MIN_REGION, REGIONS, crease_ends
 
 CREASE_KINDS = len(crease_ends(1))
 
@@ -128,8 +128,8 @@ for (int g = 0; g < groups; ++g)
         }
         group[c * groups + g] = value;
     }
-int side = leaves / REGIONS < SMALLEST_REGION ? SMALLEST_REGION : leaves / REGIONS;
-if (side > LARGEST_REGION) side = LARGEST_REGION;
+int side = leaves / REGIONS < MIN_REGION ? MIN_REGION : leaves / REGIONS;
+if (side > MAX_REGION) side = MAX_REGION;
 for (int r = 0; r * side < leaves; ++r)
     for (int c = 0; c < 6; ++c) {
         // boxes beyond the last leaf change nothing
@@ -140,8 +140,8 @@ for (int r = 0; r * side < leaves; ++r)
         ((float*)bounds)[(6 * r + c) * lanes] = value;
     }
 #endif
-""".replace("SMALLEST_REGION", str(SMALLEST_REGION))
-    .replace("LARGEST_REGION", str(LARGEST_REGION))
+""".replace("MIN_REGION", str(MIN_REGION))
+    .replace("MAX_REGION", str(MAX_REGION))
     .replace("REGIONS", str(REGIONS))
 )
 def bound_world(
