@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import logging
 import math
 from collections.abc import Iterable, Mapping
@@ -17,6 +16,7 @@ from nuno.robot.robot_model import standing_place
 from nuno.robot.support import distance_inside
 from nuno.shapes.coordinates import Coordinates
 from nuno.tasks.fold_motion import FoldMotion
+from nuno.tasks.free_way import check_lines, free_way
 from nuno.tasks.obstacles import Obstacles
 
 if TYPE_CHECKING:
@@ -45,14 +45,10 @@ STEP = 0.05
 """[s] Between two points of the way; on the cubics between them a hand strays by less than 1 mm at 3 m/s2."""
 ABOVE = 0.10
 """[m] From where hands come down to the cloth, and where they go after it."""
-TURN = 0.04
-"""[rad] Largest turn of a joint between two configurations that are looked at for collisions."""
 MARGIN = 0.02
 """[m] By which the centre of mass stays inside the outline of the soles."""
 SPARE = 0.9
 """Of the velocity limits, what a planned motion uses at most: a cubic's peak is above its mean."""
-STOPS = 200
-"""Stops that are tried on the way to the cloth, where the straight line to it is not free."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +152,8 @@ class _Planner:
         take = self._through(points[:1] + lift[1:], "down to the cloth", np.zeros(4))
         carry = self._through(points[1:], "along the way", times[1:])
         leave = self._through(points[-1:] + lift[-2::-1], "up from the cloth", np.full(4, end))
-        self._check_lines(np.concatenate([above, take, carry, leave]), "on the way")
+        where = f"the arms of {self.robot.name!r} cannot go on the way"
+        check_lines(np.concatenate([above, take, carry, leave]), self._problem_at, where)
         carry = np.concatenate([take[-1:], carry])
         columns = self.columns
         stretch = self._stretch(carry, np.diff(times))
@@ -222,33 +219,15 @@ class _Planner:
         self.robot.take_configuration(self.start)
         begin = self.robot.angle_vector()
         above = self._through(points, "over the cloth", np.zeros(1))[0]
-        try:
-            self._check_lines(np.stack([begin, above]), "to the cloth")
-            return above[None]
-        except ReachError as error:
-            failure = error
-        random = np.random.default_rng(0)  # the same stop for the same plan
-        lower, upper = (limit[self.columns] for limit in self.robot.joint_limits)
-        for _ in range(STOPS):
-            stop = above.copy()
-            extent = np.abs(above - begin)[self.columns] + 0.3
-            middle = 0.5 * (above + begin)[self.columns]
-            stop[self.columns] = np.clip(random.normal(middle, 0.5 * extent), lower, upper)
-            try:
-                self._check_lines(np.stack([begin, stop, above]), "to the cloth")
-                return np.stack([stop, above])
-            except ReachError:
-                continue
-        raise failure
+        return free_way(
+            begin, above, self.columns, self.robot.joint_limits, self._problem_at,
+            f"the arms of {self.robot.name!r} cannot go to the cloth",
+        )  # fmt: skip
 
-    def _check_lines(self, angles: np.ndarray, where: str) -> None:
-        """Check what lies between angles (k, n), each to the next on a straight line."""
-        for a, b in itertools.pairwise(angles):
-            steps = max(1, math.ceil(float(np.abs(b - a).max()) / TURN))
-            for k in range(1, steps + 1):
-                self._take(a + (b - a) * k / steps)
-                if reason := self._problem(self.robot.configuration()):
-                    raise ReachError(f"the arms of {self.robot.name!r} cannot go {where}: {reason}")
+    def _problem_at(self, angles: np.ndarray) -> str:
+        """Return what is wrong with angles (n,), and take them."""
+        self._take(angles)
+        return self._problem(self.robot.configuration())
 
     def _problem(self, q: np.ndarray, links: bool = True) -> str:
         """Return what is wrong with a configuration (nq,), "" where nothing is."""

@@ -19,7 +19,7 @@ from nuno.camera.rectangle import ClothRectangle, fit_rectangle
 from nuno.camera.regions import grow
 from nuno.camera.segmentation import segment_before
 from nuno.camera.table import Table
-from nuno.errors import EstimationError, InvalidInputError
+from nuno.errors import EstimationError, InvalidInputError, ReachError
 from nuno.estimate.pick import estimate_pick
 from nuno.estimate.pick_result import PickResult
 from nuno.materials import Cloth
@@ -29,7 +29,9 @@ from nuno.robot.links import Links
 from nuno.robot.stereo import triangulate
 from nuno.shapes.coordinates import Coordinates
 from nuno.shapes.path import Path, minimum_jerk
+from nuno.tasks.free_way import free_way
 from nuno.tasks.hand_beads import BEAD_AT, find_bead, put_beads
+from nuno.tasks.obstacles import Obstacles
 from nuno.validation import checked
 from nuno.world.world import World
 
@@ -53,6 +55,10 @@ ABOVE = 0.08
 SHOWN = {"left_hand": (0.6, 0.04, 0.24), "right_hand": (0.6, -0.02, 0.24)}
 """[m] Where what is held is looked at: x, y and above the table."""
 APPROACH_SECONDS, LIFT_SECONDS, REST_SECONDS = 1.5, 2.0, 3.0
+CLEARANCE = 0.01
+"""[m] By which the arm keeps away from the table as it goes to the towel."""
+STOPPED = 0.05
+"""[rad] Off what was asked for, from which on a motion did not get there."""
 PIECES = 8
 """Of a straight way of the hand, joint angles being interpolated within each."""
 CELLS = (20, 15)
@@ -132,6 +138,7 @@ class TowelPicker:
         size = (2.0 * table.half_extents[0], 2.0 * table.half_extents[1], table.thickness)
         place = (*table.centre, table.height - 0.5 * table.thickness)
         self.world.add(box(size, name="table", color="#a9825a", position=place))
+        self._margin = box(tuple(side + 2.0 * CLEARANCE for side in size), name="table", position=place)
         driver.update_robot_state()
         self.robot: Humanoid = driver.robot.copy()
         self.links: Links = self.robot.enter(self.world)
@@ -204,7 +211,7 @@ class TowelPicker:
         arm = ARMS[hand]
         self.world.attach(towel)
         above = point + np.array([0.0, 0.0, ABOVE])
-        self._go(hand, [above], APPROACH_SECONDS)
+        self._approach(hand, above)
         self.driver.move_gripper(arm, OPENING)
         self._go(hand, _straight(above, point), APPROACH_SECONDS)
         self.driver.start_grasp(arm)
@@ -214,28 +221,78 @@ class TowelPicker:
         self.driver.sleep(REST_SECONDS)
         return hand
 
+    def _approach(self, hand: str, point: np.ndarray) -> None:
+        """Bring what is between the fingers to a point (3,) [m] from anywhere, with the arm alone, past the table.
+
+        Raises:
+            EstimationError: the hand does not reach it, or no way there is free.
+        """
+        limb = self._limb(hand)
+        begin = self.robot.angle_vector()
+        end = self._reached(hand, point, attempts=10)  # from anywhere
+        columns = [self.robot.joint_index(name) for name in self._joints(limb)]
+        joints = {column + 2 for column in columns}
+        near = Obstacles(self.robot, [self._margin], joints)
+
+        def problem(angles: np.ndarray) -> str:
+            self.robot.angle_vector(angles)
+            met = near.met(self.robot.configuration())
+            return "" if met is None else f"{met[0]} comes within {1000.0 * CLEARANCE:.0f} mm of the table"
+
+        try:
+            way = free_way(begin, end, columns, self.robot.joint_limits, problem, f"the {hand} cannot go to the towel")
+        except ReachError as error:
+            raise EstimationError(str(error)) from error
+        turns = np.abs(np.diff(np.stack([begin, *way]), axis=0)).max(axis=1)
+        for angles, turn in zip(way, turns, strict=True):  # one by one, as only straight lines were looked at
+            self._send(limb, [angles], float(APPROACH_SECONDS * turn / max(turns.sum(), 1e-9)))
+
     def _go(self, hand: str, points: list[np.ndarray], seconds: float) -> None:
-        """Bring what is between the fingers along points (3,) [m], at even times, with the arm alone."""
+        """Bring what is between the fingers along points (3,) [m], at even times, with the arm alone.
+
+        Raises:
+            EstimationError: the hand does not get there.
+        """
+        limb = self._limb(hand)
+        # an arm on a straight way must not turn over
+        self._send(limb, [self._reached(hand, point, attempts=2) for point in points], seconds)
+
+    def _limb(self, hand: str) -> str:
+        """Return the controller of a hand's arm, for a robot that was looked at anew."""
         self.driver.angle_vector()
         self.robot.take_configuration(self.driver.robot.configuration())
-        limb = f"{ARMS[hand]}_controller"
-        own = next(
+        return f"{ARMS[hand]}_controller"
+
+    def _joints(self, limb: str) -> list[str]:
+        """Return the names of a controller's joints."""
+        found: list[str] = next(
             group["joint_names"] for group in self.driver.default_controller() if group["controller_type"] == limb
         )
-        angles = []
-        for point in points:
-            kept = self.robot.angle_vector()
-            # further attempts start from anywhere: an arm on a straight way must not turn over
-            reached = self.robot.reach(
-                {hand: pinching(hand, point)}, stance=TRUNK, attempts=10 if len(points) == 1 else 2
-            )
-            if not reached:
-                raise EstimationError(f"the {hand} does not reach {np.round(point, 3).tolist()} m: {reached.reason}")
-            found = self.robot.angle_vector()
-            self.robot.angle_vector(kept)
-            angles.append(self.robot.angle_vector({name: found[self.robot.joint_index(name)] for name in own}))
-        self.driver.angle_vector_sequence(angles, [seconds / len(points)] * len(points), limb)
+        return found
+
+    def _reached(self, hand: str, point: np.ndarray, attempts: int) -> np.ndarray:
+        """Return angles [rad] with what is between the fingers at a point (3,) [m], and take them."""
+        kept = self.robot.angle_vector()
+        reached = self.robot.reach({hand: pinching(hand, point)}, stance=TRUNK, attempts=attempts)
+        if not reached:
+            raise EstimationError(f"the {hand} does not reach {np.round(point, 3).tolist()} m: {reached.reason}")
+        found = self.robot.angle_vector()
+        self.robot.angle_vector(kept)
+        return self.robot.angle_vector(
+            {name: found[self.robot.joint_index(name)] for name in self._joints(f"{ARMS[hand]}_controller")}
+        )
+
+    def _send(self, limb: str, angles: list[np.ndarray], seconds: float) -> None:
+        """Send an arm through angles [rad] at even times, and wait; raise where it does not get there."""
+        self.driver.angle_vector_sequence(angles, [seconds / len(angles)] * len(angles), limb)
         self.driver.wait_interpolation()
+        self.driver.angle_vector()
+        there = self.driver.robot.angle_vector()
+        off = np.abs(there - angles[-1])[[self.robot.joint_index(name) for name in self._joints(limb)]].max()
+        if off > STOPPED:
+            raise EstimationError(
+                f"the {limb} stopped {off:.2f} rad before it got there; the driver's warnings say what it met"
+            )
 
     # Telling
 
