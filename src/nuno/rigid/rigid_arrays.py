@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from nuno.rigid.broad_phase import Rules
 from nuno.rigid.manifold import POINTS
 from nuno.rigid.part_table import PartTable
-from nuno.rigid.persistent_manifolds import COUNTS, NOTES, Contacts
+from nuno.rigid.persistent_manifolds import COUNTS, NOTES, OVERFLOW, Contacts
 from nuno.rigid.rigid_body import RigidState
 
 log = logging.getLogger(__name__)
@@ -46,6 +46,8 @@ PASSING = dict(
     start=(wp.vec4, POINTS), aim=(float, POINTS),
 )  # fmt: skip
 """Arrays of `Contacts` that every substep fills."""
+BY_WORLD = ("order", "waiting", "bounds")
+"""Those of them that are filled from the first place of a world on, the others by pair."""
 
 
 class RigidArrays:
@@ -157,5 +159,23 @@ class RigidArrays:
         c.parts, c.row = parts, row
 
     def _lengthen_rows(self) -> None:
-        log.info("a part has more than %d others near by: making room for twice as many", self.manifolds.row)
-        self._grow_rows(self.manifolds.parts, 2 * self.manifolds.row)
+        """Make room for twice as many near each part.
+
+        Worlds in which there was enough keep what they have found in the substep, and when they list pairs anew, as
+        they would alone.
+        """
+        c, worlds = self.manifolds, self.world_count
+        log.info("a part has more than %d others near by: making room for twice as many", c.row)
+        parts, row, longer = c.parts, c.row, 2 * c.row
+        before = {name: getattr(c, name) for name in PASSING}
+        counts, notes = c.counts.numpy().copy(), c.notes.numpy().copy()
+        self._grow_rows(parts, longer)
+        for name, (_, each) in PASSING.items():
+            shape = (1, parts * row, 1) if name in BY_WORLD else (parts, row, each)
+            wider = getattr(c, name).reshape((worlds, shape[0], shape[1] * longer // row, shape[2]))
+            wp.copy(wider[:, :, : shape[1]], before[name].reshape((worlds, *shape)))
+        entries = c.order.numpy()
+        c.order.assign(entries // row * longer + entries % row)
+        c.counts.assign(counts)
+        notes.reshape(worlds, NOTES)[counts.reshape(worlds, COUNTS)[:, OVERFLOW] != 0] = -1.0
+        c.notes.assign(notes)

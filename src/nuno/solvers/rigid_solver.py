@@ -325,12 +325,7 @@ class RigidSolver(RigidContacts):
 
     def make_room(self) -> None:
         """Make longer rows; worlds in which one was too short have still to go on."""
-        before = self.counts()
         self._lengthen_rows()
-        counts = self.counts()
-        counts[:, LEFT], counts[:, OVERFLOW] = before[:, LEFT], before[:, OVERFLOW]
-        if self._cuda:
-            self.manifolds.counts.assign(counts.ravel())
 
     def _blocks_of_group(self) -> int:
         """Blocks of a block group that takes a world, one to 32 parts; 1 where a block by itself is quicker."""
