@@ -226,14 +226,19 @@ def test_bead_that_is_hidden():
     assert len(BEAD_AT) == 3
 
 
+def looking():
+    """Return a room, and the program of a robot that has found the towel in it."""
+    room = make_room(nuno.Cloth.preset("denim"), device="cpu")
+    talos = TowelPicker(Border(room), table=TABLE, device="cpu")
+    talos.look_down()
+    talos.find_towel()
+    return room, talos
+
+
 @pytest.mark.long
 def test_the_arm_goes_past_the_table():
     """From beside the table to a corner that is far from it the straight way leads through the table's edge."""
-    room = make_room(nuno.Cloth.preset("denim"), device="cpu")
-    border = Border(room)
-    talos = TowelPicker(border, table=TABLE, device="cpu")
-    talos.look_down()
-    talos.find_towel()
+    room, talos = looking()
     talos.pick(talos.point(0, 0))
     assert room.driver.state().collision is None
     assert np.abs(true_pick(talos, room)).max() < 0.25
@@ -242,11 +247,7 @@ def test_the_arm_goes_past_the_table():
 @pytest.mark.long
 def test_an_arm_that_is_stopped_is_told():
     """Something that the robot knows nothing of stands in its way: it says so, and answers nothing."""
-    room = make_room(nuno.Cloth.preset("denim"), device="cpu")
-    border = Border(room)
-    talos = TowelPicker(border, table=TABLE, device="cpu")
-    talos.look_down()
-    talos.find_towel()
+    room, talos = looking()
     point = talos.point(0, 0)
     room.world.add(nuno.box((0.05, 0.05, 0.06), name="jar", position=(*point[:2], TABLE.height + 0.09)))
     with pytest.raises(EstimationError, match="stopped"):

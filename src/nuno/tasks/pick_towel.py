@@ -227,12 +227,10 @@ class TowelPicker:
         Raises:
             EstimationError: the hand does not reach it, or no way there is free.
         """
-        limb = self._limb(hand)
+        limb, columns = self._arm(hand)
         begin = self.robot.angle_vector()
-        end = self._reached(hand, point, attempts=10)  # from anywhere
-        columns = [self.robot.joint_index(name) for name in self._joints(limb)]
-        joints = {column + 2 for column in columns}
-        near = Obstacles(self.robot, [self._margin], joints)
+        end = self._reached(hand, columns, point, attempts=10)  # from anywhere
+        near = Obstacles(self.robot, [self._margin], {column + 2 for column in columns})
 
         def problem(angles: np.ndarray) -> str:
             self.robot.angle_vector(angles)
@@ -245,7 +243,7 @@ class TowelPicker:
             raise EstimationError(str(error)) from error
         turns = np.abs(np.diff(np.stack([begin, *way]), axis=0)).max(axis=1)
         for angles, turn in zip(way, turns, strict=True):  # one by one, as only straight lines were looked at
-            self._send(limb, [angles], float(APPROACH_SECONDS * turn / max(turns.sum(), 1e-9)))
+            self._send(limb, columns, [angles], float(APPROACH_SECONDS * turn / max(turns.sum(), 1e-9)))
 
     def _go(self, hand: str, points: list[np.ndarray], seconds: float) -> None:
         """Bring what is between the fingers along points (3,) [m], at even times, with the arm alone.
@@ -253,42 +251,35 @@ class TowelPicker:
         Raises:
             EstimationError: the hand does not get there.
         """
-        limb = self._limb(hand)
+        limb, columns = self._arm(hand)
         # an arm on a straight way must not turn over
-        self._send(limb, [self._reached(hand, point, attempts=2) for point in points], seconds)
+        self._send(limb, columns, [self._reached(hand, columns, point, attempts=2) for point in points], seconds)
 
-    def _limb(self, hand: str) -> str:
-        """Return the controller of a hand's arm, for a robot that was looked at anew."""
+    def _arm(self, hand: str) -> tuple[str, list[int]]:
+        """Read where the robot is, and return the controller of a hand's arm and the indices of its joints."""
         self.driver.angle_vector()
         self.robot.take_configuration(self.driver.robot.configuration())
-        return f"{ARMS[hand]}_controller"
-
-    def _joints(self, limb: str) -> list[str]:
-        """Return the names of a controller's joints."""
-        found: list[str] = next(
+        limb = f"{ARMS[hand]}_controller"
+        names = next(
             group["joint_names"] for group in self.driver.default_controller() if group["controller_type"] == limb
         )
-        return found
+        return limb, [self.robot.joint_index(name) for name in names]
 
-    def _reached(self, hand: str, point: np.ndarray, attempts: int) -> np.ndarray:
+    def _reached(self, hand: str, columns: list[int], point: np.ndarray, attempts: int) -> np.ndarray:
         """Return angles [rad] with what is between the fingers at a point (3,) [m], and take them."""
         kept = self.robot.angle_vector()
         reached = self.robot.reach({hand: pinching(hand, point)}, stance=TRUNK, attempts=attempts)
         if not reached:
             raise EstimationError(f"the {hand} does not reach {np.round(point, 3).tolist()} m: {reached.reason}")
-        found = self.robot.angle_vector()
-        self.robot.angle_vector(kept)
-        return self.robot.angle_vector(
-            {name: found[self.robot.joint_index(name)] for name in self._joints(f"{ARMS[hand]}_controller")}
-        )
+        kept[columns] = self.robot.angle_vector()[columns]
+        return self.robot.angle_vector(kept)
 
-    def _send(self, limb: str, angles: list[np.ndarray], seconds: float) -> None:
+    def _send(self, limb: str, columns: list[int], angles: list[np.ndarray], seconds: float) -> None:
         """Send an arm through angles [rad] at even times, and wait; raise where it does not get there."""
         self.driver.angle_vector_sequence(angles, [seconds / len(angles)] * len(angles), limb)
         self.driver.wait_interpolation()
         self.driver.angle_vector()
-        there = self.driver.robot.angle_vector()
-        off = np.abs(there - angles[-1])[[self.robot.joint_index(name) for name in self._joints(limb)]].max()
+        off = np.abs(self.driver.robot.angle_vector() - angles[-1])[columns].max()
         if off > STOPPED:
             raise EstimationError(
                 f"the {limb} stopped {off:.2f} rad before it got there; the driver's warnings say what it met"
