@@ -19,13 +19,13 @@ LIFT_SECONDS = 1.5
 REST = 0.1  # [s] before the lift
 
 
-def model_of(scene: Any, pick: Any, cells: tuple[int, int]) -> str:
+def model_of(scene: Any, pick: Any, cells: tuple[int, int], membrane: float = MEMBRANE, radius: float = RADIUS) -> str:
     """The model's XML: a table, a cloth of triangles that bend and stretch, and a hand that leads one of its points.
 
     A plate of thickness t and Young's modulus E has the bending rigidity E t^3 / 12 (1 - nu^2).
     """
     rectangle, table, material = scene.rectangle, scene.table, pick.material
-    thickness = float(np.sqrt(12.0 * material["bending_rigidity"] * (1.0 - POISSON**2) / MEMBRANE))
+    thickness = float(np.sqrt(12.0 * material["bending_rigidity"] * (1.0 - POISSON**2) / membrane))
     spacing = np.array([rectangle.long_m, rectangle.short_m]) / cells
     x, y, z = rectangle.centre
     half = (*table.half_extents, table.thickness / 2)
@@ -41,31 +41,38 @@ def model_of(scene: Any, pick: Any, cells: tuple[int, int]) -> str:
 <body name="hand" mocap="true" pos="{hand[0]} {hand[1]} {hand[2]}"/>
 <flexcomp name="cloth" type="grid" dim="2" count="{cells[0] + 1} {cells[1] + 1} 1"
  spacing="{spacing[0]} {spacing[1]} {spacing.min()}" pos="{x} {y} {z}" euler="0 0 {np.degrees(rectangle.yaw)}"
- mass="{mass}" radius="{RADIUS}">
+ mass="{mass}" radius="{radius}">
 <contact selfcollide="auto" friction="{friction}" solref="0.01 1"/>
-<elasticity young="{MEMBRANE / thickness}" poisson="{POISSON}" thickness="{thickness}" damping="0.002"
+<elasticity young="{membrane / thickness}" poisson="{POISSON}" thickness="{thickness}" damping="0.002"
  elastic2d="both"/>
 </flexcomp>
 </worldbody>
 </mujoco>"""
 
 
-def simulate(scene: Any, picks: Sequence[Any], hold: float, device: str) -> tuple[np.ndarray, np.ndarray, Any]:
-    """Pick one cloth in as many ways as there are picks; arguments and answer as those of `nuno_picks.simulate`."""
+def simulate(
+    scene: Any, picks: Sequence[Any], hold: float, device: str, *, cells_along: int = CELLS, **cloth: float
+) -> tuple[np.ndarray, np.ndarray, Any]:
+    """Pick one cloth in as many ways as there are picks; arguments and answer as those of `nuno_picks.simulate`.
+
+    ``cells_along`` its longer side it has, and ``cloth`` are further arguments of `model_of`.
+    """
     rectangle = scene.rectangle
-    across = 5 * max(3, round(CELLS * rectangle.short_m / rectangle.long_m / 5))
-    cells = (CELLS, across)
+    across = 5 * max(3, round(cells_along * rectangle.short_m / rectangle.long_m / 5))
+    cells = (cells_along, across)
     # Nuno's own sheet tells where each of its vertices lies, in which order they are drawn
     before = np.asarray(table_world(rectangle, scene.table, cells, device=device, substeps=1)[1].vertices)
-    after = [_picked(scene, pick, before, cells, hold) for pick in tqdm(picks, disable=None, desc="MuJoCo")]
+    after = [_picked(scene, pick, before, cells, hold, cloth) for pick in tqdm(picks, disable=None, desc="MuJoCo")]
     return before, np.stack(after), cells
 
 
-def _picked(scene: Any, pick: Any, before: np.ndarray, cells: tuple[int, int], hold: float) -> np.ndarray:
+def _picked(
+    scene: Any, pick: Any, before: np.ndarray, cells: tuple[int, int], hold: float, cloth: dict[str, float]
+) -> np.ndarray:
     """Vertices (n, 3) [m] once the cloth hangs."""
     import mujoco
 
-    spec = mujoco.MjSpec.from_string(model_of(scene, pick, cells))
+    spec = mujoco.MjSpec.from_string(model_of(scene, pick, cells, **cloth))
     i, j = pick.ij
     row = j * cells[1] // 5
     row = cells[1] - row if is_turned(scene.rectangle) else row

@@ -1,33 +1,35 @@
 """Pairs of silhouettes from which `nuno.estimate.learned` was learned: ``python benchmarks/outline_pairs.py --help``.
 
-Needs PyTorch (``pip install torch``) beside Nuno. A scene is one cloth on one table, lifted to several hands, each
-seen by a camera of its own. To every hand picks of all 36 grid points are imagined, on an estimator's mesh and with
-guesses of its own, from a rectangle that is measured a little wrong; and 18 real ones are made, on another mesh, with
-another step and material, and with noise on the edge. All 36 are equally likely to be the true one, whatever the
-hand: so nothing can be learned of how far hands go. Half of the cameras stand as in the cases, half anywhere around
-the table, so that one cloth is seen from many sides. What is written is, for each real silhouette, a picture of it,
-pictures of the guesses at the eight best candidates, each at its best turn, and the hand-made log likelihoods of all.
+Needs PyTorch (``pip install torch``) beside Nuno. In every scene (`outline_scenes.py`) picks of all 36 grid points are
+imagined to every hand, on an estimator's meshes and with its guesses, from a rectangle that is measured a little wrong
+and to a hand that is told a little wrong now and then; and some real ones are made, on another mesh, with another step
+and material, or by another engine, and with noise on the edge. What is written is, for each real silhouette, a picture
+of it, pictures of the guesses at the eight best candidates, each at its best turn, and the hand-made log likelihoods
+of all.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
 import warp as wp
-from generated_cases import HAND_RADIUS, REST_HEIGHT, looking_at
+from generated_cases import HAND_RADIUS, REST_HEIGHT
 from outline_pictures import boxes_of, compare, masks, on_device, pictures, with_noise
+from outline_scenes import GRID, Layout, drawn
 
 from nuno.camera.camera import Camera
 from nuno.camera.rectangle import ClothRectangle
 from nuno.camera.table import Table
 from nuno.estimate.coming_to_rest import REST_SPEED
 from nuno.estimate.futures import LIFT_SECONDS, rest_speed, solver_of, table_world
-from nuno.estimate.hypotheses import FIRM, LOOSE, SHEARING, Hypothesis, cell_counts, hypotheses_with
+from nuno.estimate.hypotheses import DISCRETISATIONS, Discretisation, Hypothesis, cell_counts
 from nuno.estimate.learned import WIDTH, described
 from nuno.estimate.outline_net import SIZE
 from nuno.estimate.ranking import CONTOUR_WEIGHT, OVERLAP_WEIGHT
@@ -35,24 +37,13 @@ from nuno.estimate.rotations import TURNS, log_prior
 from nuno.materials import Cloth
 from nuno.shapes.path import Path as HandPath
 
-FIRST = (FIRM[1], FIRM[8], LOOSE[3], LOOSE[6])
-"""What an estimate begins with."""
-OTHERS = tuple(h for h in FIRM + LOOSE + SHEARING if h not in FIRST)
-DOUBLES = hypotheses_with(3000.0, 1200.0)
-GRID = np.array([divmod(k, 6) for k in range(36)]) / 5
+GUESSES = (5, 3)
+"""Of a scene, on the mesh of the first stages and on that of the fourth."""
 BEST, NEAR, FAR = 8, 11, 5
 """Candidates of which pictures are kept; real picks of those nearest to the hand, and of others drawn at random: with
 eight hands not more of these than an H200 has processors."""
-TURNED, TURN_SPREAD = 0.4, np.radians(14)  # share of the scenes whose real cloths are turned about the hand, [rad]
-AROUND = 0.5  # share of the cameras that stand anywhere around the table
-
-
-def rectangle(centre: np.ndarray, size: np.ndarray, yaw: float) -> ClothRectangle:
-    """A cloth whose first corner is the sheet's own: labels matter to nobody here."""
-    axes = np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])
-    signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) / 2
-    corners = np.concatenate([centre[:2] + (signs * size) @ axes, np.full((4, 1), centre[2])], axis=1)
-    return ClothRectangle(corners, float(size[0]), float(size[1]), corners.mean(axis=0), yaw, 0.0)
+EDGE_NOISE = (0.2, 2.2)  # [px] of 640, standard deviation of the real edges' displacement
+TURNED, TURN_SPREAD = 0.4, np.radians(14)  # share of the views in which real cloths are turned about the hand, [rad]
 
 
 def lift(
@@ -79,18 +70,24 @@ def lift(
     return solver.positions_on_device(), np.asarray(body.faces), np.asarray(solver.finite()), world
 
 
-def guesses(rng: np.random.Generator) -> list[tuple[int, int, tuple[Hypothesis, ...]]]:
-    """Meshes, substeps and guesses of a scene: eight in all, some of them on the finer mesh now and then."""
-    if rng.uniform() < 0.35:
-        return [(20, 14, FIRST), (25, 20, tuple(DOUBLES[k] for k in rng.permutation(len(DOUBLES))[:4]))]
-    return [(20, 14, FIRST + tuple(OTHERS[k] for k in rng.permutation(len(OTHERS))[:4]))]
+def guesses(rng: np.random.Generator) -> list[tuple[Discretisation, tuple[Hypothesis, ...]]]:
+    """Meshes and guesses of a scene: the first stage's, and some of those that an estimate has later."""
+    first, second, _, fourth, fifth, last = DISCRETISATIONS
+    later = [second.hypotheses + last.hypotheses, fourth.hypotheses + fifth.hypotheses]
+    plain = [[replace(h, hand=(0.0, 0.0, 0.0), mistake=0.0) for h in of] for of in later]
+    coarse, fine = GUESSES
+    some = [
+        tuple(of[k] for k in rng.permutation(len(of))[:count])
+        for of, count in zip(plain, (coarse - len(first.hypotheses), fine), strict=True)
+    ]
+    return [(first, first.hypotheses + some[0]), (fourth, some[1])]
 
 
 def materials(rng: np.random.Generator, n: int) -> dict[str, np.ndarray]:
     """Materials of real cloths; half of them as stiff in their plane as cloth is by default."""
     default, usual = rng.uniform(size=n) < 0.5, Cloth()
     return dict(
-        bending_rigidity=np.exp(rng.uniform(np.log(1.5e-5), np.log(2.5e-3), n)),
+        bending_rigidity=np.exp(rng.uniform(np.log(2e-6), np.log(5e-3), n)),
         area_density=rng.uniform(0.1, 0.4, n), friction=rng.uniform(0.2, 0.8, n),
         thickness=rng.uniform(0.002, 0.006, n), air_drag=rng.uniform(0.5, 3.0, n),
         stretch_stiffness=np.where(default, 1000.0, np.exp(rng.uniform(np.log(150), np.log(3000), n))),
@@ -98,39 +95,37 @@ def materials(rng: np.random.Generator, n: int) -> dict[str, np.ndarray]:
     )  # fmt: skip
 
 
-def scene(rng: np.random.Generator, count: int, device: str, generator: Any) -> list[dict[str, Any]]:
-    """One cloth lifted to ``count`` hands: an example for every real pick."""
-    table = Table(
-        rng.uniform(0.70, 0.76), (rng.uniform(0.36, 0.48), rng.uniform(0.56, 0.66)), (rng.uniform(0.08, 0.13), 0.0)
-    )
-    long_m = rng.uniform(0.38, 0.80)
-    size = np.array([long_m, rng.uniform(max(0.33, 0.55 * long_m), min(0.98 * long_m, 0.62))])
-    yaw = rng.uniform(0, 2 * np.pi)
-    centre = np.array([rng.uniform(0.0, 0.1), rng.uniform(-0.06, 0.06), table.height + REST_HEIGHT])
-    true = rectangle(centre, size, yaw)
-    off = np.append(rng.normal(0, 0.0008, 2), 0.0)
-    measured = rectangle(centre + off, size * (1 + rng.normal(0, 0.002, 2)), yaw + rng.normal(0, 0.003))
-    along, across = (true.corners[k] - true.corners[0] for k in (1, 3))
-    begin = true.corners[0] + GRID[:, :1] * along + GRID[:, 1:] * across
-    hands, cameras = [], []
-    while len(hands) < count:
-        angle, reach = rng.uniform(0, 2 * np.pi), rng.uniform(0, 0.12)
-        hand = begin[rng.integers(36)] + (reach * np.cos(angle), reach * np.sin(angle), rng.uniform(0.28, 0.52))
-        eye = np.array([rng.uniform(-1.0, -0.78), rng.uniform(-0.14, 0.14), table.height + rng.uniform(0.48, 0.75)])
-        target = np.array([0.1, 0.0, table.height + 0.12]) + rng.normal(0, 0.02, 3)
-        about = rng.uniform(0, 2 * np.pi) if rng.uniform() < AROUND else 0.0
-        turn = np.array([[np.cos(about), -np.sin(about), 0], [np.sin(about), np.cos(about), 0], [0, 0, 1]])
-        middle = np.array([0.1, 0.0, 0.0])
-        eye, target = (middle + turn @ (point - middle) for point in (eye, target))
-        camera = looking_at(eye, target, rng.uniform(400, 600))
-        pixels = camera.project(true.corners)
-        if pixels.min() > 8 and (pixels < (631, 471)).all():
-            hands.append(hand)
-            cameras.append(camera)
+def real_cloths(rng: np.random.Generator, lay: Layout, device: str) -> tuple[wp.array, np.ndarray, np.ndarray, Any]:
+    """The real picks of a scene by Nuno's engine: as `lift`."""
+    sides = np.array([lay.true.long_m, lay.true.short_m])
+    mesh = 5 * np.maximum(np.round(sides / rng.uniform(0.015, 0.022) / 5).astype(int), 3)
+    hands = np.repeat(lay.hands, lay.picks.shape[1], axis=0)
+    return lift(
+        lay.true, lay.table, mesh, int(rng.integers(18, 46)), lay.picks.ravel(), hands,
+        materials(rng, lay.picks.size), device,
+    )  # fmt: skip
+
+
+def cloths_of(
+    after: np.ndarray, cells: np.ndarray, lay: Layout, device: str
+) -> tuple[wp.array, np.ndarray, np.ndarray, Any]:
+    """The real picks (n, vertices, 3) [m] of another engine: as `lift`."""
+    world, cloth = table_world(lay.true, lay.table, (int(cells[0]), int(cells[1])), device=device, substeps=1)
+    finite = np.isfinite(after).all(axis=(1, 2))
+    positions = wp.array(np.where(finite[:, None, None], after, 0.0), dtype=wp.vec3, device=device)
+    return positions, np.asarray(cloth.faces), finite, world
+
+
+def scene(
+    rng: np.random.Generator, lay: Layout, real: tuple[wp.array, np.ndarray, np.ndarray, Any], device: str,
+    generator: Any,
+) -> list[dict[str, Any]]:  # fmt: skip
+    """One cloth lifted to some hands: an example for every real pick in every view."""
     imagined = []
     spreads = guesses(rng)
-    kinds = np.concatenate([described(spread_, cells) for cells, _, spread_ in spreads]).astype(np.float16)
-    for cells, substeps, spread_ in spreads:
+    kinds = np.concatenate([described(spread_, mesh.cells) for mesh, spread_ in spreads]).astype(np.float16)
+    count, n = lay.picks.shape
+    for mesh, spread_ in spreads:
         each = {
             name: np.tile(np.repeat([getattr(h, name) for h in spread_], 36), count)
             for name in (
@@ -138,48 +133,36 @@ def scene(rng: np.random.Generator, count: int, device: str, generator: Any) -> 
             )
         }  # fmt: skip
         each["thickness"] = np.full(len(each["friction"]), 2 * REST_HEIGHT)
-        mesh = np.array(cell_counts(measured.long_m, measured.short_m, cells, (6, 6)))
+        cells = np.array(cell_counts(lay.measured.long_m, lay.measured.short_m, mesh.cells, (6, 6)))
         candidates = np.tile(np.arange(36), len(spread_) * count)
-        to = np.repeat(hands, len(spread_) * 36, axis=0)
-        imagined.append((lift(measured, table, mesh, substeps, candidates, to, each, device), len(spread_)))
-    picks, weights = [], []
-    for hand in hands:
-        order = np.argsort(np.linalg.norm(begin[:, :2] - hand[:2], axis=1))
-        picks.append(np.concatenate([order[:NEAR], rng.permutation(order[NEAR:])[:FAR]]))
-        weight = np.full(36, np.log(FAR / (36 - NEAR)))
-        weight[order[:NEAR]] = 0.0
-        weights.append(weight)
-    mesh = 5 * np.maximum(np.round(size / rng.uniform(0.015, 0.022) / 5).astype(int), 3)
-    n = NEAR + FAR
-    real = lift(
-        true, table, mesh, int(rng.integers(18, 46)), np.concatenate(picks), np.repeat(hands, n, axis=0),
-        materials(rng, n * count), device,
-    )  # fmt: skip
-    turned = rng.uniform() < TURNED
+        to = np.repeat(lay.told, len(spread_) * 36, axis=0)
+        futures = lift(lay.measured, lay.table, cells, mesh.substeps, candidates, to, each, device)
+        imagined.append((futures, len(spread_)))
     examples: list[dict[str, Any]] = []
     for k in range(count):
-        turn = float(rng.normal(0, TURN_SPREAD)) if turned else 0.0
         part = [tuple(a[k * g * 36 : (k + 1) * g * 36] for a in (of[0], of[2])) for of, g in imagined]
-        found = _examples(
-            cameras[k], hands[k], real[0][k * n : (k + 1) * n], real[1], turn, part, [of[1] for of, _ in imagined],
-            real[3], generator,
-        )  # fmt: skip
-        good = found.pop("good") & real[2][k * n : (k + 1) * n]
-        for q in np.nonzero(good)[0]:
-            example = {name: value[q] for name, value in found.items()}
-            true_at = int(picks[k][q])
-            sideways = np.float16(np.linalg.norm(begin[true_at, :2] - hands[k][:2]))
-            examples.append(
-                example | {
-                    "true": true_at, "weight": weights[k].astype(np.float16), "sideways": sideways, "guess": kinds,
-                }
+        for camera in lay.cameras[k]:
+            turn = float(rng.normal(0, TURN_SPREAD)) if rng.uniform() < TURNED else 0.0
+            found = _examples(
+                camera, lay.told[k], real[0][k * n : (k + 1) * n], real[1], turn, part, [of[1] for of, _ in imagined],
+                real[3], float(rng.uniform(*EDGE_NOISE)), generator,
             )  # fmt: skip
+            good = found.pop("good") & real[2][k * n : (k + 1) * n]
+            for q in np.nonzero(good)[0]:
+                example = {name: value[q] for name, value in found.items()}
+                true_at = int(lay.picks[k][q])
+                examples.append(
+                    example | {
+                        "true": true_at, "weight": lay.weights[k].astype(np.float16),
+                        "sideways": np.float16(lay.sideways[k, true_at]), "guess": kinds,
+                    }
+                )  # fmt: skip
     return examples
 
 
 def _examples(
     full: Camera, hand: np.ndarray, positions: wp.array, faces: np.ndarray, turn: float, imagined: list[Any],
-    meshes: list[np.ndarray], world: Any, generator: Any,
+    meshes: list[np.ndarray], world: Any, noise_px: float, generator: Any,
 ) -> dict[str, np.ndarray]:  # fmt: skip
     """Everything of one hand, by its real picks: what `outline_training.py` reads."""
     scale = WIDTH / 640
@@ -191,7 +174,7 @@ def _examples(
     sharp = masks(positions, on_device(faces, device), camera, hand, turn, world)
     rim = sharp[:, 0].any(1) | sharp[:, -1].any(1) | sharp[:, :, 0].any(1) | sharp[:, :, -1].any(1)
     good = ~rim & (sharp.flatten(1).sum(1) > 60)
-    share = with_noise(sharp, 1 / scale, generator) * ~hidden
+    share = with_noise(sharp, noise_px, 1 / scale, generator) * ~hidden
     real = share > 0.5
     finite = torch.tensor(np.concatenate([f for _, f in imagined]), device=real.device)
     stack, contours, overlaps, errors = [], [], [], []
@@ -237,6 +220,24 @@ def _examples(
     }  # fmt: skip
 
 
+def scenes(options: argparse.Namespace) -> Iterator[tuple[int, Layout, Any]]:
+    """Numbers, layouts and real cloths of scenes."""
+    if options.real is None:
+        for number in range(options.scenes):
+            seed = options.seed * 1000 + number
+            rng = np.random.default_rng(seed)
+            lay = drawn(rng, options.hands, options.views, NEAR, FAR)
+            yield seed, lay, real_cloths(rng, lay, options.device)
+        return
+    for path in options.real:
+        with np.load(path) as made:
+            for name in made.files:
+                if name.endswith(".after"):
+                    seed = int(name.removesuffix(".after"))
+                    lay = drawn(np.random.default_rng(seed), *made["shape"].tolist())
+                    yield seed, lay, cloths_of(made[name], made[f"{seed}.cells"], lay, options.device)
+
+
 def main() -> None:
     """Make scenes for a while and write what they teach."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -245,6 +246,8 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=150.0)
     parser.add_argument("--scenes", type=int, default=10**6, help="no more than so many")
     parser.add_argument("--hands", type=int, default=8, help="of one scene")
+    parser.add_argument("--views", type=int, default=2, help="of one hand")
+    parser.add_argument("--real", type=Path, nargs="+", help="real cloths that outline_scenes.py made, not Nuno's own")
     parser.add_argument("--device", default="cuda:0")
     options = parser.parse_args()
     wp.config.log_level = wp.LOG_ERROR
@@ -258,10 +261,11 @@ def main() -> None:
     generator.manual_seed(options.seed)
     examples: list[dict[str, Any]] = []
     started, number = time.perf_counter(), 0
-    while time.perf_counter() - started < options.seconds and number < options.scenes:
-        rng = np.random.default_rng(options.seed * 100003 + number)
-        made = scene(rng, options.hands, options.device, generator)
-        examples += [example | {"scene": options.seed * 1000 + number} for example in made]
+    for seed, lay, real in scenes(options):
+        if time.perf_counter() - started > options.seconds or number == options.scenes:
+            break
+        made = scene(np.random.default_rng((seed, 2)), lay, real, options.device, generator)
+        examples += [example | {"scene": seed} for example in made]
         number += 1
         print(f"{number} scenes, {len(examples)} examples, {time.perf_counter() - started:.0f} s", flush=True)
     np.savez(options.out, **{name: np.stack([e[name] for e in examples]) for name in examples[0]})

@@ -20,7 +20,7 @@ from nuno.estimate.learned import BORDER
 from nuno.estimate.outline_net import LEVELS, SIZE
 from nuno.estimate.rotations import view_of_turned
 
-EDGE_NOISE, NOISE_LENGTH = 2.0, 4.0  # [px] of 640
+NOISE_LENGTH = 4.0  # [px] of 640
 
 wp.set_module_options({"enable_backward": False})
 
@@ -112,15 +112,15 @@ def compare(real: Any, imagined: Any, hidden: Any, pixel: float) -> tuple[Any, A
     return contour * pixel, overlap
 
 
-def with_noise(images: Any, pixel: float, generator: Any) -> Any:
-    """Masks (n, h, w) whose edges are displaced by smooth noise, as shares of pixels."""
+def with_noise(images: Any, noise_px: float, pixel: float, generator: Any) -> Any:
+    """Masks (n, h, w) whose edges are displaced by smooth noise [px of 640], as shares of pixels."""
     n, height, width = images.shape
     reach = int(6 * NOISE_LENGTH / pixel) | 1
     bell = torch.exp(-0.5 * ((torch.arange(reach, device=images.device) - reach // 2) * pixel / NOISE_LENGTH) ** 2)
     noise = torch.randn(2 * n, 1, height, width, device=images.device, generator=generator)
     for shape, padding in (((1, 1, 1, reach), (0, reach // 2)), ((1, 1, reach, 1), (reach // 2, 0))):
         noise = torch.nn.functional.conv2d(noise, bell.view(shape), padding=padding)
-    noise = (noise * (EDGE_NOISE / pixel / noise.std())).view(n, 2, height, width)
+    noise = (noise * (noise_px / pixel / noise.std())).view(n, 2, height, width)
     y, x = torch.meshgrid(*(torch.arange(k, device=images.device) for k in (height, width)), indexing="ij")
     return _sampled(images.float(), x + noise[:, 0], y + noise[:, 1])
 

@@ -24,6 +24,7 @@ import torch
 from torch import nn
 from torch.nn import functional
 
+from nuno.estimate.learned import HAND_MADE_SHARE
 from nuno.estimate.outline_net import LEVELS, SCALARS, SIZE, STRIDES
 
 CHANNELS = (24, 48, 64, 64, 96)
@@ -163,19 +164,49 @@ def check(net: Net, data: dict[str, Any], rows: Any) -> None:
         )  # fmt: skip
 
 
-def begun(path: Path, scalars: int = SCALARS) -> Net:
-    """A network with the weights that an earlier run kept, which may have been told less: (pair, place) alone, say."""
-    net, old = Net(scalars), torch.load(path, weights_only=True)
-    new = net.state_dict()
-    for name, value in old.items():
-        if new[name].shape == value.shape:
-            new[name] = value
-        elif name == "mix.weight":  # what it was not told counts for nothing at first
-            new[name] = functional.pad(value, (0, new[name].shape[1] - value.shape[1]))
-        else:
-            new[name][: len(value)] = value
-    net.load_state_dict(new)
+def begun(path: Path, data: dict[str, Any], rows: Any) -> Net:
+    """A network with the weights of one that was written, an .npz as Nuno brings it.
+
+    Its batch norms were folded into its layers, so each gets the mean and deviation of some examples now, and the
+    share and bias that make up for them: at first it says the same.
+    """
+    net = Net().to(rows.device)
+    with np.load(path, allow_pickle=False) as file:
+        stored = {name: torch.from_numpy(file[name]).to(rows.device) for name in file.files}
+
+    def layer(name: str, *shape: int) -> Any:
+        whole = stored[name].flatten(1).float() * stored[f"{name}.scale"][:, None]
+        return whole.view(len(whole), *shape)
+
+    side, last = SIZE // 16, CHANNELS[-1]
+    with torch.no_grad():
+        x = pictures_of(data, rows[torch.randperm(len(rows), device=rows.device)[:AT_ONCE]])
+        for k, channels in enumerate((2, *CHANNELS[:-1])):
+            convolution, norm = net.look[3 * k], net.look[3 * k + 1]
+            width = convolution.kernel_size[0]
+            convolution.weight.copy_(layer(f"conv{k}", width, width, channels).permute(0, 3, 1, 2))
+            x = convolution(x)
+            norm.running_mean.copy_(x.mean((0, 2, 3)))
+            norm.running_var.copy_(x.var((0, 2, 3)))
+            norm.weight.copy_(torch.sqrt(norm.running_var + norm.eps))
+            norm.bias.copy_(stored[f"conv{k}.bias"] + norm.running_mean)
+            x = functional.relu(x + stored[f"conv{k}.bias"][:, None, None])
+        net.dense.weight.copy_(layer("dense", side, side, last).permute(0, 3, 1, 2).flatten(1))
+        net.dense.bias.copy_(stored["dense.bias"])
+        net.norm.running_mean.copy_(stored["mean"])
+        net.norm.running_var.copy_(stored["deviation"] ** 2 - net.norm.eps)
+        for name in ("mix", "narrow", "ratio"):
+            part = getattr(net, name)
+            part.weight.copy_(layer(name, part.in_features))
+            part.bias.copy_(stored[f"{name}.bias"])
+        net.temperature.fill_(HAND_MADE_SHARE)
     return net
+
+
+def pictures_of(data: dict[str, Any], rows: Any) -> Any:
+    """All pairs of pictures (n, 2, SIZE, SIZE) of some examples."""
+    imagined = unpacked(data["imagined"][rows].flatten(1, 2))
+    return torch.stack([unpacked(data["real"][rows])[:, None].expand_as(imagined), imagined], dim=2).flatten(0, 1)
 
 
 def train(
@@ -259,7 +290,7 @@ def main() -> None:
     parser.add_argument("--epochs", type=float, default=20.0)
     parser.add_argument("--seconds", type=float, default=1e9, help="shorter, where it is earlier")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--begin", type=Path, help="a .pt of an earlier run to begin from, at half the learning rate")
+    parser.add_argument("--begin", type=Path, help="an .npz of an earlier run to begin from, at half the learning rate")
     parser.add_argument("--device", default="cuda:0")
     options = parser.parse_args()
     torch.manual_seed(options.seed)
@@ -271,13 +302,12 @@ def main() -> None:
         f"{len(rows)} examples, {len(choosing)} for choosing, {len(checking)} for checking, "
         f"{time.perf_counter() - started:.0f} s", flush=True,
     )  # fmt: skip
-    net = (Net() if options.begin is None else begun(options.begin)).to(options.device)
+    net = Net().to(options.device) if options.begin is None else begun(options.begin, data, rows)
     peak = PEAK if options.begin is None else PEAK / 2
     net = train(net, data, rows, choosing, checking, options.epochs, options.seconds, peak)
     for held in (choosing, checking):
         if len(held):
             check(net, data, held)
-    torch.save(net.state_dict(), options.out.with_suffix(".pt"))
     write(net, options.out)
 
 
