@@ -96,8 +96,10 @@ def adopt_commands(robot, random):
 
 
 CHOICES = (
-    walk, walk, go, drive, drive, stay, wave, close, open_hand, wall, push, change, run, run, run, go_back, adopt, adopt_commands
+    walk, walk, go, stay, wave, close, open_hand, wall, push, change, run, run, run, go_back, adopt, adopt_commands
 )  # fmt: skip
+JOYSTICKS = (*CHOICES, drive, drive)
+"""Of a robot that begins without dynamics."""
 
 
 def room(dynamics):
@@ -161,17 +163,19 @@ def check(seed, dynamics):
     robot = room(dynamics)
     world, log = robot.world, []
     for _ in range(OPERATIONS):
-        operation = CHOICES[random.integers(len(CHOICES))]
+        choices = CHOICES if dynamics else JOYSTICKS
+        operation = choices[random.integers(len(choices))]
         log.append(operation.__name__)
         try:
             operation(robot, random)
         except nuno.NunoError as error:
             log[-1] += f" ({type(error).__name__})"
     robot.world.run(random.choice([0.05, 1.0, 4.0]))
-    # hands that close grip nothing in copies: they have closed or opened before
-    closing = [own for own in robot.grippers.values() if own.will_hold]
-    robot.wait_until(lambda: not any(own.will_hold for own in closing), timeout=2.0)
-    saved, sec = world.save(), (None, 1.0, JOYSTICK)[random.integers(3)]
+    if dynamics:  # where hands that close grip nothing in copies: they have closed or opened before
+        closing = [own for own in robot.grippers.values() if own.will_hold]
+        robot.wait_until(lambda: not any(own.will_hold for own in closing), timeout=2.0)
+    kinds = (None, 1.0) if dynamics else (None, 1.0, JOYSTICK)
+    saved, sec = world.save(), kinds[random.integers(len(kinds))]
     ways = random.uniform(-0.2, 0.2, (3, 3)) * (1.0 if sec is None else 0.15)  # strides are as long as they are
     ways[2] = ways[0]
     wrong, futures = [], world.imagine(3)

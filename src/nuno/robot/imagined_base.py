@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from nuno.robot.balance import Balance
     from nuno.robot.motion_batch import MotionBatch
     from nuno.robot.robot_state import RobotState
-    from nuno.robot.simulated_joints import Sent
     from nuno.robot.wanted_motion import WantedMotion
     from nuno.world.world import World
 
@@ -38,7 +37,7 @@ class ImaginedBase:
     balance: Balance | None
     _motions: list[WantedMotion]
     _states: list[RobotState]
-    _sent: list[tuple[Sent | WalkOrder, ...]]
+    _sent: list[tuple[Any, ...]]
     _together: MotionBatch
     _base_goals: list[Goal | None]
 
@@ -110,11 +109,11 @@ class ImaginedBase:
         with self.world.lock:
             chosen = self._chosen_worlds(worlds)
             goals = []
-            for w, place in zip(chosen, self._ways((x, y, yaw), len(chosen)).tolist(), strict=True):
+            for w, (ahead, left, turn) in zip(chosen, self._ways((x, y, yaw), len(chosen)).tolist(), strict=True):
                 gait, clock = self._motions[w].gait, self._motions[w].joints.clock
                 gait.forget()
-                goals.append(gait.drive(*place, span))
-                self._sent[w] += (WalkOrder(clock, tuple(place), None, gait.walk, span),)
+                goals.append(gait.drive(ahead, left, turn, span))
+                self._sent[w] += (WalkOrder(clock, (ahead, left, turn), None, gait.walk, span),)
             return self._set_off(chosen, goals)
 
     @checked
