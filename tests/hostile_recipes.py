@@ -550,6 +550,8 @@ UNCALLED = {
     "of a camera that is not plugged in": ("UsbCamera.*",),
     "between the parts of the package, with checked numbers": (
         "Grip.lead",
+        "Grip.release_in",
+        "Joint.release_in",
         "HoldResult.of",
         "Grip.spec_for",
         "Joint.lead",
@@ -557,6 +559,8 @@ UNCALLED = {
         "SimulatedRobot.imagined",
         "SimulatedRobot.take_future",
         "SimulatedRobot.future_commands",
+        "SimulatedRobot.follow_grips",
+        "Hand.take_grips",
         "Joint.spec_for",
         "Path.keys_around",
         "Walk.ensure",

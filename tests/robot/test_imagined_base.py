@@ -109,6 +109,122 @@ def test_walks_change_under_way_beside_other_commands(scene):
 
 
 @pytest.mark.long
+def test_velocities_that_are_sent_again(scene):
+    """As from a joystick: one that ends at the wall, one that changes, one not renewed; landings as by the driver."""
+    world, robot, saved = scene
+    world.restore(saved)
+    futures = world.imagine(3)
+    speeds = np.array([[0.12, 0.0, 0.0], [0.0, 0.02, 0.05], [0.05, 0.0, 0.0]])
+    pieces = [(0.5, 1.0), (0.5, 1.0)] if robot.is_dynamic else [(0.5, 2.5)] * 5
+
+    def driven(send, run):
+        for k, (span, hold) in enumerate(pieces):
+            send(k, hold)
+            run(span)
+        run(0.3 if robot.is_dynamic else 4.0)
+
+    def way(w, k):
+        return speeds[w] * (1.0 if k < 3 else -1.0)
+
+    def send(k, hold):
+        worlds = [0, 1, 2] if k == 0 else [0, 1]  # the third hears of it once
+        assert futures.robot.send_velocity(*np.array([way(w, k) for w in worlds]).T, hold, worlds=worlds).all()
+
+    driven(send, futures.run)
+    ends = states_of(futures)
+    for w in range(3):
+        world.restore(saved)
+
+        def send_alone(k, hold, w=w):
+            if w < 2 or k == 0:
+                robot.send_velocity(*way(w, k), hold)
+
+        driven(send_alone, world.run)
+        assert_same(ends[w], state_of(world, robot.state()))
+    assert not np.array_equal(ends[0]["q"], ends[1]["q"]) and not np.array_equal(ends[1]["q"], ends[2]["q"])
+    world.restore(saved)
+    robot.send_velocity(*speeds[1], 3.0)  # and one under way goes on, to a wall or not
+    world.run(0.3)
+    again = world.imagine(2)
+    again.robot.send_velocity(*speeds[0], 3.0, worlds=1)
+    world.adopt(again, 1, only="commands")
+    for own in (world, again):
+        own.run(0.1 if robot.is_dynamic else 4.0)
+    assert_same(states_of(again)[1], state_of(world, robot.state()))
+
+
+def test_velocities_are_looked_at_alike(still_talos):
+    """Before a wall that came while the robot stood, it does not set off, nor do copies; with dynamics all do."""
+    world = nuno.World(device="cpu")
+    robot = nuno.SimulatedRobot(still_talos, world)
+    robot.angle_vector({"head_1_joint": 0.1}, 0.1)
+    world.run(0.2)
+    world.add(nuno.box((0.1, 3.0, 2.0), name="wall", position=(0.3, 0.0, 1.0)))
+    futures = world.imagine(1)
+    assert not futures.robot.send_velocity(0.1, 0.0, 0.0).any()
+    goal = robot.send_velocity(0.1, 0.0, 0.0)
+    assert goal.status == GoalStatus.REJECTED and "'wall'" in goal.text
+    assert futures.robot.base_goals()[0].text == goal.text
+    dynamic = nuno.SimulatedRobot(nuno.Humanoid("talos"), nuno.World(device="cpu"), dynamics=True)
+    dynamic.detach()
+    dynamic.world.add(nuno.box((0.1, 3.0, 2.0), name="wall", position=(0.3, 0.0, 1.0)))
+    dynamic.angle_vector({"head_1_joint": 0.1}, 0.1)
+    dynamic.world.run(0.2)
+    dynamic.attach()
+    futures = dynamic.world.imagine(1)
+    assert futures.robot.send_velocity(0.1, 0.0, 0.0).all()
+    assert dynamic.send_velocity(0.1, 0.0, 0.0).status == GoalStatus.ACTIVE
+
+
+@pytest.mark.long
+def test_velocities_are_commands_and_are_adopted(scene):
+    """A future whose robot was sent velocities is adopted, as a whole and by its commands alone."""
+    world, robot, saved = scene
+    world.restore(saved)
+    futures = world.imagine(2)
+    spans = (0.2, 0.2, 0.2) if robot.is_dynamic else (0.3, 0.3, 2.6)
+    futures.run(spans[0])
+    futures.robot.send_velocity([0.05, 0.08], 0.0, [0.0, 0.1], 2.0)
+    futures.run(spans[1])
+    kept, again = futures.save(), futures.imagine(1, world=1)
+    futures.robot.send_velocity(0.0, [0.03, 0.02], 0.0, 2.0)
+    futures.run(spans[2])
+    ends = states_of(futures)
+    again.robot.send_velocity(0.0, 0.02, 0.0, 2.0)
+    again.run(spans[2])
+    assert_same(states_of(again)[0], ends[1])
+    world.adopt(futures, 0, only="commands")
+    before = world.save()
+    for _ in range(2):
+        for span in spans:
+            world.run(span)
+        assert_same(state_of(world, robot.state()), ends[0])
+        world.restore(before)
+    futures.restore(kept)
+    world.adopt(futures, 1)
+    robot.send_velocity(0.0, 0.02, 0.0, 2.0)
+    world.run(spans[2])
+    assert_same(state_of(world, robot.state()), ends[1])
+
+
+def test_velocities_that_cannot_be_kept(scene, caplog):
+    """One faster than the stride allows is refused by world, where the robot stands and where it walks."""
+    world, _, saved = scene
+    world.restore(saved)
+    futures = world.imagine(2)
+    with caplog.at_level(logging.WARNING, logger="nuno"):
+        assert futures.robot.send_velocity([0.05, 1.0], 0.0, 0.0).tolist() == [True, False]
+        assert "did not set off in worlds [1]: " in caplog.text and "at most" in caplog.text
+        assert futures.robot.send_velocity(1.0, 0.0, 0.0, worlds=0).tolist() == [False]
+    assert all(goal.status == GoalStatus.REJECTED for goal in futures.robot.base_goals())
+    futures.run(0.1)
+    assert [own.gait.is_walking for own in futures.robot._motions] == [True, False]
+    for bad in ((0.1, 0.0, np.nan), ([0.1] * 3, 0.0, 0.0), (0.1, 0.0, 0.0, 0.0)):
+        with pytest.raises(InvalidInputError):
+            futures.robot.send_velocity(*bad)
+
+
+@pytest.mark.long
 def test_walks_are_saved_imagined_and_adopted(scene):
     """A batch goes back with its walks; copies of a copy and the robot that adopts one go on with the same bits."""
     world, robot, saved = scene

@@ -67,14 +67,29 @@ def go_back(robot, random):
 
 
 def adopt(robot, random):
-    """Become one of two futures, whose palms go to different places."""
+    """Become one of two futures, whose palms go to different places, and whose hands may close or open there."""
     futures = robot.world.imagine(2)
     futures.robot.angle_vector({"lift": random.uniform(0.0, 0.1, 2)}, 0.2)
+    if futures.robot.hands:
+        futures.robot.move_gripper("rarm", random.integers(0, 2, 2))
+        futures.run(random.choice([0.0, 0.35]))
     futures.run(0.05)
     robot.world.adopt(futures, int(random.integers(2)))
 
 
+def adopt_commands(robot, random):
+    """Do what the robot's hand was told in a future, after a while."""
+    futures = robot.world.imagine(2)
+    futures.run(0.05)
+    futures.robot.move_gripper("rarm", random.integers(0, 2, 2))
+    futures.robot.angle_vector({"lift": random.uniform(0.0, 0.1, 2)}, 0.1)
+    futures.run(0.05)
+    robot.world.adopt(futures, int(random.integers(2)), only="commands")
+
+
 CHOICES = (lift, sequence, close, close, open_hand, stop, push, put, change, run, run, go_back, adopt)
+GRASPS = (*CHOICES, adopt_commands)
+"""Of a robot that begins without dynamics, whose hand is commanded in futures."""
 
 
 def room(folder, dynamics):
@@ -107,7 +122,8 @@ def check(seed, folder, dynamics):
     robot = room(folder, dynamics)
     world, log = robot.world, []
     for _ in range(OPERATIONS):
-        operation = CHOICES[random.integers(len(CHOICES))]
+        choices = CHOICES if dynamics else GRASPS
+        operation = choices[random.integers(len(choices))]
         log.append(operation.__name__)
         try:
             operation(robot, random)
@@ -126,8 +142,11 @@ def check(seed, folder, dynamics):
     # commands by world: each as its own driver carries it out; one is adopted
     world.restore(saved)
     futures = world.imagine(2)
-    heights = random.uniform(0.0, 0.1, 2)
+    heights, grasps = random.uniform(0.0, 0.1, 2), random.integers(0, 2, 2)
     futures.robot.angle_vector({"lift": heights}, 0.2)
+    futures.run(AHEAD)
+    if futures.robot.hands:
+        futures.robot.move_gripper("rarm", grasps)
     futures.run(AHEAD)
     ends = [state_of(futures, state, k) for k, state in enumerate(futures.robot.state())]
     world.adopt(futures, 1)
@@ -137,10 +156,20 @@ def check(seed, folder, dynamics):
     ends[1] = state_of(futures, futures.robot.state()[1], 1)
     wrong += [f"adopted, later: {name}" for name in differing(state_of(world, robot.state()), ends[1])]
 
+    # the same as by its driver: what it is told, and what it grips
+    world.restore(saved)
+    robot.angle_vector({"lift": heights[0]}, 0.2)
+    world.run(AHEAD)
+    if not robot.is_dynamic:
+        robot.move_gripper("rarm", float(grasps[0]), wait=False)
+    world.run(AHEAD)
+    wrong += [f"driven: {name}" for name in differing(state_of(world, robot.state()), ends[0])]
+
     # commands alone: the robot does from the same moment what its copy did
     world.restore(saved)
     world.adopt(futures, 0, only="commands")
     world.run(AHEAD)
+    world.run(AHEAD)  # in the same steps, as sums of times are rounded
     wrong += [f"commanded: {name}" for name in differing(state_of(world, robot.state()), ends[0])]
     return [f"seed {seed} after {', '.join(log)}: {each}" for each in wrong]
 

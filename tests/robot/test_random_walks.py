@@ -10,6 +10,8 @@ OPERATIONS = 6
 AHEAD = 0.4
 """[s] In which copies are compared: a walk is in its first step then."""
 ARM = "arm_left_4_joint"
+JOYSTICK = "joystick"
+"""In place of a time for which to go at a velocity: it is sent again, and changed, while the robot walks."""
 
 
 def walk(robot, random):
@@ -20,6 +22,12 @@ def walk(robot, random):
 def go(robot, random):
     """Go at a velocity, or go on so."""
     robot.go_velocity(*random.uniform(-0.03, 0.03, 3), sec=1.5, wait=False)
+
+
+def drive(robot, random):
+    """Send a velocity as a joystick does; perhaps none."""
+    velocity = random.uniform(-0.04, 0.04, 3) * (random.random() < 0.8)
+    robot.send_velocity(*velocity, hold=random.choice([0.3, 1.5]))
 
 
 def stay(robot, random):
@@ -90,6 +98,8 @@ def adopt_commands(robot, random):
 CHOICES = (
     walk, walk, go, stay, wave, close, open_hand, wall, push, change, run, run, run, go_back, adopt, adopt_commands
 )  # fmt: skip
+JOYSTICKS = (*CHOICES, drive, drive)
+"""Of a robot that begins without dynamics."""
 
 
 def room(dynamics):
@@ -121,18 +131,28 @@ def differing(found, expected):
 
 def imagined(futures, ways, sec, seconds):
     """Let copies go their ways, and an arm of theirs on the way; return what they came to."""
-    futures.robot.go_pos(*ways.T) if sec is None else futures.robot.go_velocity(*ways.T, sec)
+    if sec == JOYSTICK:
+        futures.robot.send_velocity(*ways.T)
+    else:
+        futures.robot.go_pos(*ways.T) if sec is None else futures.robot.go_velocity(*ways.T, sec)
     futures.run(seconds)
     futures.robot.angle_vector({ARM: -1.0}, 0.3)
+    if sec == JOYSTICK:
+        futures.robot.send_velocity(*-ways.T, 3.0)
     futures.run(seconds)
     return [state_of(futures, state, k) for k, state in enumerate(futures.robot.state())]
 
 
 def alone(robot, way, sec, seconds):
     """Let the robot do the same in its own world."""
-    robot.go_pos(*way, wait=False) if sec is None else robot.go_velocity(*way, sec, wait=False)
+    if sec == JOYSTICK:
+        robot.send_velocity(*way)
+    else:
+        robot.go_pos(*way, wait=False) if sec is None else robot.go_velocity(*way, sec, wait=False)
     robot.world.run(seconds)
     robot.angle_vector({ARM: -1.0}, 0.3)
+    if sec == JOYSTICK:
+        robot.send_velocity(*-way, 3.0)
     robot.world.run(seconds)
     return state_of(robot.world, robot.state())
 
@@ -143,17 +163,19 @@ def check(seed, dynamics):
     robot = room(dynamics)
     world, log = robot.world, []
     for _ in range(OPERATIONS):
-        operation = CHOICES[random.integers(len(CHOICES))]
+        choices = CHOICES if dynamics else JOYSTICKS
+        operation = choices[random.integers(len(choices))]
         log.append(operation.__name__)
         try:
             operation(robot, random)
         except nuno.NunoError as error:
             log[-1] += f" ({type(error).__name__})"
     robot.world.run(random.choice([0.05, 1.0, 4.0]))
-    # hands that close grip nothing in copies: they have closed or opened before
-    closing = [own for own in robot.grippers.values() if own.will_hold]
-    robot.wait_until(lambda: not any(own.will_hold for own in closing), timeout=2.0)
-    saved, sec = world.save(), (None, 1.0)[random.integers(2)]
+    if dynamics:  # where hands that close grip nothing in copies: they have closed or opened before
+        closing = [own for own in robot.grippers.values() if own.will_hold]
+        robot.wait_until(lambda: not any(own.will_hold for own in closing), timeout=2.0)
+    kinds = (None, 1.0) if dynamics else (None, 1.0, JOYSTICK)
+    saved, sec = world.save(), kinds[random.integers(len(kinds))]
     ways = random.uniform(-0.2, 0.2, (3, 3)) * (1.0 if sec is None else 0.15)  # strides are as long as they are
     ways[2] = ways[0]
     wrong, futures = [], world.imagine(3)

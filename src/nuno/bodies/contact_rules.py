@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
 
@@ -15,24 +17,31 @@ class ContactRules:
     Attributes:
         friction: The coefficient of each pair that has its own.
         ignored: The pairs that pass through each other.
-        held: Those that do while a grip holds one of them; see `set_held`.
+        held: Those that do while a grip holds one of them, and in which worlds (worlds,) bool; see `set_held`.
         summed: The bodies for which impulses of static bodies are summed up; see ``World.sum_impulses``.
     """
 
     def __init__(self) -> None:
         self.friction: dict[frozenset[str], Any] = {}
         self.ignored: set[frozenset[str]] = set()
-        self.held: set[frozenset[str]] = set()
+        self.held: dict[frozenset[str], np.ndarray] = {}
         self.summed: set[str] = set()
 
-    def set_held(self, pairs: Iterable[tuple[str, str]]) -> None:
-        """Take the keys of each held body and of what it passes through: what holds a rigid body is no obstacle."""
-        self.held = {frozenset(pair) for pair in pairs}
+    def set_held(self, pairs: Iterable[tuple[str, str, np.ndarray]]) -> None:
+        """Take the keys of each held body and of what it passes through: what holds a rigid body is no obstacle.
 
-    def touch(self, a: Body, b: Body) -> bool:
-        """Return True if two bodies touch each other at all."""
+        With each the worlds (worlds,) bool in which it is held.
+        """
+        self.held = {}
+        for a, b, worlds in pairs:
+            pair = frozenset((a, b))
+            self.held[pair] = self.held[pair] | worlds if pair in self.held else worlds
+
+    def touch(self, a: Body, b: Body, world: int | None = None) -> bool:
+        """Return True if two bodies touch each other at all, in one world of a batch or in any."""
         pair = frozenset((a.key, b.key))
-        if pair in self.ignored or pair in self.held:
+        held = self.held.get(pair)
+        if pair in self.ignored or (held is not None and (held.all() if world is None else held[world])):
             return False
         return bool(a.group & b.collides_with) and bool(b.group & a.collides_with)
 

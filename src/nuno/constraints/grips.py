@@ -21,14 +21,23 @@ from nuno.numbers.lanes import (  # noqa: F401 (add, div, mul, sub: Warp takes t
 )
 from nuno.state.cloth_state import CLOCK, LOADS, Settings
 
+SAME_TIME = wp.constant(wp.float64(1.0e-9))
+"""[s] Below which two times are the same."""
+SHARES = wp.constant(wp.float64(2.0**30))
+"""Shares of the way between two keys, more than a float tells; those of substeps, n in all, are 1 / n apart."""
+
 
 @wp.func
 def key_position(t: Any, run: Settings, g: int):
-    """Return where grip g should be now: linear or quintic minimum jerk between its key frames."""
+    """Return where grip g should be now: linear or quintic minimum jerk between its key frames.
+
+    Whether a run goes through a frame or through many, its times are the same but for rounding. What comes of them is
+    the same to the bit, as the share of the way between two keys is rounded to `SHARES`.
+    """
     now = run.grip_start[0] + wp.float64(lane_max(t.notes[CLOCK])) * run.step
     first = g * run.keys
     k = int(0)
-    while k < run.keys - 2 and now > run.grip_time[first + k + 1]:
+    while k < run.keys - 2 and now > run.grip_time[first + k + 1] + SAME_TIME:
         k = k + 1
     last = wp.min(k + 1, run.keys - 1)
     begin = run.grip_time[first + k]
@@ -36,7 +45,7 @@ def key_position(t: Any, run: Settings, g: int):
     span = wp.sub(run.grip_time[first + last], begin)
     s = float(1.0)
     if span > wp.float64(0.0):
-        s = wp.clamp(float(wp.sub(now, begin) / span), 0.0, 1.0)
+        s = wp.clamp(float(wp.rint(wp.sub(now, begin) / span * SHARES) / SHARES), 0.0, 1.0)
     if run.grip_ease[g] != 0:
         s = s * s * s * (10.0 + s * (6.0 * s - 15.0))
     a = first + k
@@ -57,14 +66,15 @@ def hold_vertices(t: Any, run: Settings, rank: int, size: int):
     one = full_like(t.x[0], 1.0)
     for g in range(rank, run.grips, size):
         if run.grip_fixed[g] != 0:
-            x, y, z = key_position(t, run, g)
-            i = clipped(t.grip_corner[3 * g])
-            # a world without this grip writes back what was there
             on = index_mask(one, t.grip_corner[3 * g])
-            place(t.w, i, choose(on, t.grip_inverse_mass[g], gather(t.w, i)))
-            place(t.x, i, choose(on, x, gather(t.x, i)))
-            place(t.y, i, choose(on, y, gather(t.y, i)))
-            place(t.z, i, choose(on, z, gather(t.z, i)))
+            if lane_max(on) > 0.0:  # where no lane's world has it, another thread may be moving what would be written
+                x, y, z = key_position(t, run, g)
+                i = clipped(t.grip_corner[3 * g])
+                # a world without this grip writes back what was there
+                place(t.w, i, choose(on, t.grip_inverse_mass[g], gather(t.w, i)))
+                place(t.x, i, choose(on, x, gather(t.x, i)))
+                place(t.y, i, choose(on, y, gather(t.y, i)))
+                place(t.z, i, choose(on, z, gather(t.z, i)))
 
 
 @wp.func
@@ -106,8 +116,9 @@ def pull_points(t: Any, run: Settings, rank: int, size: int):
 @wp.func
 def read_loads(t: Any, run: Settings, rank: int, size: int):
     """Sum up what the constraints pulled stiffly gripped vertices with, and put the vertices back."""
+    one = full_like(t.x[0], 1.0)
     for g in range(rank, run.grips, size):
-        if run.grip_fixed[g] != 0:
+        if run.grip_fixed[g] != 0 and lane_max(index_mask(one, t.grip_corner[3 * g])) > 0.0:
             x, y, z = key_position(t, run, g)
             i = clipped(t.grip_corner[3 * g])
             on = index_mask(x, t.grip_corner[3 * g])

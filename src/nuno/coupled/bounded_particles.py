@@ -35,7 +35,7 @@ class Particles:
     body_moved: wp.array(dtype=wp.int64)
     # one after the other: of those in active rows, the first row with a rigid body, -1: none
     first_row: wp.array(dtype=int)
-    held: wp.array(dtype=int)  # (rigid slots), whether a grip or joint holds it, in part or entirely
+    held: wp.array(dtype=int)  # (worlds * rigid slots), whether a grip or joint holds it, in part or entirely
     # those in active rows, their contacts with shapes, `MOST` a particle (see `nuno.coupled.shape_bounds`), and those
     # that have any
     pressed: wp.array(dtype=int)

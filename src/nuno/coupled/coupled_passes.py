@@ -180,7 +180,7 @@ def solve(
                         off = join_row(particles, rigid, first, start, rows, r)
                     elif not solved:
                         off = push_row(particles, rigid, first, start, rows, r, linked, at_once)
-                if not joins and not (solved and rubs_both(particles, rows, r)):
+                if not joins and not (solved and rubs_both(particles, start, rows, r)):
                     off = wp.max(off, drag_row(particles, rigid, first, start, rows, r, linked, at_once))
                 if counts:
                     note_wrong(passing, island, off, size)
@@ -202,7 +202,7 @@ def solve(
                         wrong = wp.max(wrong, off)
             for k in range(holds.count):
                 island = island_of(passing, world, holds.body[k])
-                if goes_on(passing, island):
+                if goes_on(passing, island) and holds.limit[world * holds.count + k] >= 0.0:
                     off = project_hold(rigid, holds, world, k, dt, fraction)
                     if counts:
                         note_wrong(passing, island, off, size)
@@ -239,7 +239,8 @@ def solve(
         for k in range(ties.count):
             sum_tie(particles, rigid, ties, world, k, dt, fraction)
         for k in range(holds.count):
-            sum_hold(rigid, holds, world, k, dt, fraction)
+            if holds.limit[world * holds.count + k] >= 0.0:
+                sum_hold(rigid, holds, world, k, dt, fraction)
         for k in range(joints.count):
             sum_joint(rigid, joints, world, k, dt)
     if at_once != 0:

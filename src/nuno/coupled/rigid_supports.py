@@ -61,14 +61,17 @@ def supports_of(particles: Particles, first: int, rows: Rows, r: int):
     return found
 
 
-def held_slots(capacity: int, holds: Holds, joints: Joints) -> np.ndarray:
-    """Return (capacity) int32, 1 for each rigid body that a grip or joint holds, in part or entirely."""
-    held = np.zeros(capacity, dtype=np.int32)
-    for count, slots in ((holds.count, holds.slot), (joints.count, joints.slot), (joints.count, joints.other)):
-        if count:
-            found = slots.numpy()[:count]
-            held[found[found >= 0]] = 1
-    return held
+def held_slots(worlds: int, capacity: int, holds: Holds, joints: Joints) -> np.ndarray:
+    """Return (worlds * capacity) int32, 1 for each rigid body that a grip or joint holds, in part or entirely."""
+    held = np.zeros((worlds, capacity), dtype=np.int32)
+    if holds.count:
+        there = holds.limit.numpy().reshape(worlds, holds.count) >= 0.0
+        for k, slot in enumerate(holds.slot.numpy()[: holds.count]):
+            held[there[:, k], slot] = 1
+    for slots in (joints.slot, joints.other) if joints.count else ():
+        found = slots.numpy()[: joints.count]
+        held[:, found[found >= 0]] = 1
+    return held.ravel()
 
 
 @wp.func
@@ -127,14 +130,14 @@ def with_mate(rows: Rows, r: int, k_pass: int):
 
 
 @wp.func
-def rubs_both(particles: Particles, rows: Rows, r: int):
+def rubs_both(particles: Particles, start: int, rows: Rows, r: int):
     """Return True if the friction of a row with a mate is solved with its mate's.
 
     Not where something holds a body: how two that are held share friction is open, and a difference between them would
     use it up.
     """
     mate = rows.mate[r]
-    free = particles.held[rows.slot[r]] == 0 and particles.held[rows.slot[mate]] == 0
+    free = particles.held[start + rows.slot[r]] == 0 and particles.held[start + rows.slot[mate]] == 0
     return free and rows.friction[mate] > 0.0
 
 

@@ -205,9 +205,9 @@ def drag_row(particles: Particles, rigid: RigidState, first: int, start: int, ro
         if c >= 0:
             return drag_between(particles, rigid, first, start, rows, r, c, slip, most, at_once)
         # how two that are held share friction is open: a difference between them would use it up
-        if linked != 0 and particles.held[rows.slot[r]] == 0:
+        if linked != 0 and particles.held[start + rows.slot[r]] == 0:
             s = support_of(particles, rows, r, first + rows.corners[r][0], n)
-            if s >= 0 and particles.held[rows.slot[wp.max(s, 0)]] == 0:
+            if s >= 0 and particles.held[start + rows.slot[wp.max(s, 0)]] == 0:
                 return drag_both(particles, rigid, first, start, rows, r, s, slip, most)
     drag = old
     if length > 1.0e-12:

@@ -62,7 +62,8 @@ class Holds:
     free: wp.array(dtype=wp.vec3)  # (worlds * count), along which the body slides, in the world's frame; zero: none
     place: wp.array(dtype=wp.vec3)  # (worlds * 2 * count): at the frame's start and end, or in the leader's frame
     turn: wp.array(dtype=wp.quat)
-    limit: wp.array(dtype=float)  # (worlds * count) [N], what it bears at most, and of turns [N m]
+    # (worlds * count) [N], what it bears at most, and of turns [N m]; negative: it does not hold in this world
+    limit: wp.array(dtype=float)
     pull: wp.array(dtype=wp.vec3)  # (worlds * count)
     twist: wp.array(dtype=wp.vec3)
     total: wp.array(dtype=wp.vec3)

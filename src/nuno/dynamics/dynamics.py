@@ -56,8 +56,8 @@ class Dynamics:
         self.material, self.friction, self.world_count = material, friction, world.world_count
         self.grips: list[Grip] = []
         self.pushes: list[Push] = []
-        self.grips_changed = False
-        self.collider_version = -1
+        self.grips_changed, self.collider_version = False, -1
+        self.grips_before: tuple[list[Grip], np.ndarray] | None = None  # see `note_grips`
 
     substeps: int
 
@@ -132,6 +132,16 @@ class Dynamics:
     def pushing(self, time: float) -> tuple[Push, ...]:
         """Return the pushes that act from ``time`` [s] on."""
         return tuple(push for push in self.pushes if push.end is None or push.end > time + SOON)
+
+    def point_grips(self) -> list[Grip]:
+        """Return the grips of its points that its solver knows: no ties."""
+        return [grip for grip in self.grips if not grip.is_tie]
+
+    def note_grips(self, worlds: np.ndarray | None) -> None:
+        """Be told that grips change, in all worlds or in some (worlds,) bool; in others those of before are known."""
+        known = self.grips_before if self.grips_changed else (self.point_grips(), np.zeros(self.world_count, bool))
+        self.grips_changed = True
+        self.grips_before = None if known is None or worlds is None else (known[0], known[1] | worlds)
 
     def fits(self, material: Material, world_count: int, friction: Any) -> bool:
         """Return True if this can take a state of the given material, worlds and friction."""
@@ -256,13 +266,13 @@ class ParticleDynamics(Dynamics):
 
     def prepare(self, time: float, frame: float) -> None:
         """Bring the grips and pushes of a span from ``time`` on; a leading body's last move takes a ``frame`` [s]."""
-        grips = [grip for grip in self.grips if not grip.is_tie]
+        grips = self.point_grips()
         for grip in self.grips:
             if grip.is_tie and grip.offsets is not None:
                 grip.spec_for(time, frame)
         if self.grips_changed or any(grip.target is not None for grip in grips):
             self.solver.set_grips([grip.spec_for(time, frame) for grip in grips])
-            self.grips_changed = False
+            self.grips_changed, self.grips_before = False, None
         pushing = self.pushing(time)
         if pushing != self._pushing:
             self.solver.set_forces(np.sum([p.force for p in pushing], axis=0) if pushing else None)
@@ -270,8 +280,7 @@ class ParticleDynamics(Dynamics):
 
     def shape_impulses(self) -> dict[str, np.ndarray]:
         """Return what static bodies gave this one in the last frame, (worlds, 3) [N s], by key, where it is summed."""
-        given: dict[str, np.ndarray] = {} if self.solver.sums is None else self.solver.sums.given()
-        return given
+        return {} if self.solver.sums is None else dict(self.solver.sums.given())
 
     def sum_impulses(self, on: bool) -> None:
         """Sum up what shapes give the body, from the next frame on, or no more. The motion keeps its bits."""

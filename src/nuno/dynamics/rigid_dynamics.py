@@ -17,7 +17,7 @@ from nuno.materials import Rigid
 from nuno.rigid.rigid_arrays import PARTS, SAVED
 from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import Pose, compose, invert
-from nuno.solvers.rigid_solver import RigidSolver
+from nuno.solvers.rigid_solver import NO_EXCEPTION, UNTOUCHED, RigidSolver
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
@@ -75,7 +75,7 @@ class RigidScene:
         self.kept: dict[str, tuple[int, tuple[int, ...]]] = {}
         self._moving: list[str] = []  # static bodies that had velocities in the last frame
         self._saved: dict[tuple[str, str], Any] = {}
-        self._version = -1
+        self._version, self._slots = -1, dict[str, int]()
 
     @staticmethod
     def settings_of(world: RigidWorld) -> tuple[Any, ...]:
@@ -90,7 +90,7 @@ class RigidScene:
         """Tell the solver what changed among static bodies, and which pairs are exceptions."""
         if self.is_current(world):
             return
-        slots: dict[str, int] = {}
+        self._slots = slots = dict[str, int]()
         seen = set()
         for body in world._bodies.values():
             if body.is_dynamic:
@@ -102,16 +102,30 @@ class RigidScene:
             slots[body.key] = self.bring_static(body)
         for key in [key for key in self.static if key not in seen]:
             self.solver.remove(self.static.pop(key).slot)
+        self._set_exceptions(world, slots)
+        self.solver.set_order(list(slots.values()))
+        self._version = world._collider_version
+
+    def held_changed(self, world: RigidWorld, worlds: np.ndarray) -> None:
+        """Tell the solver which pairs touch now that other bodies are held in some worlds (worlds,) bool."""
+        if self.is_current(world):  # else it will be told of all
+            before = self.solver.save_listing()
+            self._set_exceptions(world, self._slots)
+            after, rows = self.solver.save_listing(), worlds[:, None, None]  # anew in those worlds alone
+            self.solver.load_listing({name: np.where(rows, own, before[name]) for name, own in after.items()})
+
+    def _set_exceptions(self, world: RigidWorld, slots: Mapping[str, int]) -> None:
         rules = world._rules
-        exceptions: dict[frozenset[str], Any] = {**rules.friction, **dict.fromkeys(rules.ignored | rules.held)}
+        exceptions: dict[frozenset[str], Any] = {**rules.friction, **dict.fromkeys(rules.ignored)}
+        for pair, worlds in rules.held.items():  # where it is not held, as if it were no exception
+            own = exceptions.get(pair, NO_EXCEPTION)
+            exceptions[pair] = None if own is None else np.where(worlds, UNTOUCHED, own)
         pairs: dict[tuple[int, int], Any] = {}
         for pair, mu in exceptions.items():
             if len(pair) == 2 and all(key in slots for key in pair):
                 a, b = pair
                 pairs[slots[a], slots[b]] = mu
         self.solver.set_exceptions(pairs)
-        self.solver.set_order(list(slots.values()))
-        self._version = world._collider_version
 
     def lead(self, world: RigidWorld, time: float, duration: float) -> list[int]:
         """Let static bodies that follow paths move at a steady pace for a frame or less; return their slots."""

@@ -136,12 +136,20 @@ class Grip:
 
     def release(self) -> None:
         """Let go. Nothing happens where the grip was released before, or the body detached or removed."""
+        self.release_in(None)
+
+    def release_in(self, worlds: np.ndarray | None) -> None:
+        """Let go in all worlds, or in some of a batch (worlds,) bool; in the others nothing changes, to the bit.
+
+        Raises:
+            BodyStateError: a joint, in some worlds.
+        """
         world = self._world
         if world is not None:
             with world.lock:
                 world._check_between_frames("release")
                 if self._world is not None:
-                    world._drop_grip(self)
+                    world._drop_grip(self, worlds)
 
     def spec_for(self, time: float, frame: float) -> GripSpec:
         """Return the keys for a run from ``time`` on; a leading body's last move takes one ``frame`` [s]."""
@@ -259,5 +267,5 @@ class GripWorld(WorldSettings, Protocol):
     def _wrench(self, grip: Grip) -> tuple[np.ndarray, np.ndarray]:
         """Return force [N] and torque [N m], (worlds, 3) each, that an active grip bears."""
 
-    def _drop_grip(self, grip: Grip) -> None:
-        """Let a grip go."""
+    def _drop_grip(self, grip: Grip, worlds: np.ndarray | None) -> None:
+        """Let a grip go, in all worlds or in some (worlds,) bool."""

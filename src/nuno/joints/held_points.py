@@ -1,18 +1,57 @@
-"""The points that a grip holds."""
+"""The points that a grip holds, and in which worlds it holds any."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nuno.errors import BodyStateError
 from nuno.joints.grip import GripSpec
 from nuno.joints.joint import JointSpec
-from nuno.joints.tie import HoldSpec
+from nuno.joints.tie import HoldSpec, corners_of
 from nuno.shapes.coordinates import compose
 
 if TYPE_CHECKING:
     from nuno.joints.grip import Grip
+
+
+def holding(spec: Any, worlds: int) -> np.ndarray:
+    """Return (worlds,) bool, where a grip, tie or hold of these numbers holds anything; joints do everywhere."""
+    if isinstance(spec, HoldSpec | JointSpec):
+        held: Any = getattr(spec, "held", None)
+        held = True if held is None else held
+    else:
+        own = getattr(spec, "vertices", None)
+        held = (corners_of(spec)[0][..., 0] if own is None else own).max(axis=1, initial=-1) >= 0
+    return np.array(np.broadcast_to(held, (worlds,)))
+
+
+def holds_in(spec: Any, index: int) -> bool:
+    """Return True if a grip, tie or hold of these numbers holds anything in one world of a batch."""
+    if isinstance(spec, HoldSpec | JointSpec):
+        held = getattr(spec, "held", None)
+        return held is None or bool(held[index])
+    own = getattr(spec, "vertices", None)
+    rows = corners_of(spec)[0][..., 0] if own is None else own
+    return bool(rows[index if len(rows) > 1 else 0].max(initial=-1) >= 0)
+
+
+def released(spec: Any, worlds: np.ndarray) -> Any:
+    """Return a grip's, tie's or hold's numbers where it holds nothing in some worlds (worlds,) bool.
+
+    Raises:
+        BodyStateError: they are a joint's, which joins in all worlds or in none.
+    """
+    if isinstance(spec, JointSpec):
+        raise BodyStateError("a joint joins in all worlds or in none: release it in all")
+    if isinstance(spec, HoldSpec):
+        return replace(spec, held=holding(spec, len(worlds)) & ~worlds)
+    name = "corners" if getattr(spec, "vertices", None) is None else "vertices"
+    values = np.array(getattr(spec, name))
+    values[worlds] = -1
+    return replace(spec, **{name: values})
 
 
 def held_points(grip: Grip, index: int = 0, vertices: np.ndarray | None = None) -> np.ndarray:

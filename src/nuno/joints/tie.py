@@ -63,6 +63,7 @@ class HoldSpec:
         compliance: [m/N], and [1/(N m)] for turns; 0 is stiff.
         max_force: (worlds,) float64 [N], the most that it bears; of turns as much [N m].
         ignored: Keys of the bodies that the held one passes through.
+        held: (worlds,) bool, in which worlds it holds; None is in all.
     """
 
     times: np.ndarray
@@ -73,6 +74,7 @@ class HoldSpec:
     compliance: float
     max_force: np.ndarray | float = np.inf
     ignored: tuple[str, ...] = ()
+    held: np.ndarray | None = None
 
     def at(self, time: float) -> Pose:
         """Return positions (worlds, 3) and quaternions (worlds, 4) at a time [s]."""
@@ -91,6 +93,8 @@ def batched_spec(spec: Any, batched: Any) -> Any:
         "quaternions", "place", "turn", "other_place", "other_turn", "drives",
     )  # fmt: skip
     changed = {name: batched(getattr(spec, name)) for name in names if hasattr(spec, name)}
+    if getattr(spec, "held", None) is not None:
+        changed["held"] = batched(spec.held)
     limit = getattr(spec, "max_force", None)
     return replace(spec, **changed, **({"max_force": batched(limit)} if isinstance(limit, np.ndarray) else {}))
 

@@ -50,7 +50,7 @@ class Rules:
     collides_with: wp.array(dtype=int)
     exceptions: int
     pair: wp.array(dtype=wp.int64)  # smaller slot * 2^32 + larger, sorted
-    pair_friction: wp.array(dtype=float)  # (worlds, exceptions); negative: they do not touch
+    pair_friction: wp.array(dtype=float)  # (worlds, exceptions); -1: they do not touch, -2: no exception here
 
 
 @wp.func
@@ -81,7 +81,8 @@ def pair_friction(rules: Rules, s: RigidState, world: int, a: int, b: int):
         mu = wp.sqrt(rules.friction[first + a] * rules.friction[first + b])
         found = find_exception(rules, a, b)
         if found >= 0:
-            mu = rules.pair_friction[world * rules.exceptions + found]
+            own = rules.pair_friction[world * rules.exceptions + found]
+            mu = wp.where(own < -1.5, mu, own)
     return mu
 
 

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from nuno.materials import Cloth, Soft
-
-if TYPE_CHECKING:
-    from nuno.bodies.body import Body
 
 LINES = 9
 """Lines along each side of the pads, from one finger to the other, along which a body's thickness is measured."""
@@ -19,14 +16,17 @@ CRUSHED = 0.6
 """Share of a soft body's thickness by which fingers compress it at most."""
 
 
-def closing_gap(body: Body, local: np.ndarray, low: np.ndarray, high: np.ndarray, axis: int, force: float) -> float:
+def closing_gap(
+    faces: np.ndarray, material: Any, local: np.ndarray, low: np.ndarray, high: np.ndarray, axis: int, force: float
+) -> float:  # fmt: skip
     """Return how far apart fingers stay that close on a body [m]; 0 where it is not between them.
 
     A rigid body keeps them apart by its thickness, a soft one by what the force leaves of it, and a cloth by the
     thickness of as many layers as lie there.
 
     Args:
-        body: The body.
+        faces: (m, 3) int, the body's.
+        material: The body's.
         local: (n, 3) [m], its vertices in the frame of the hand.
         low: (3,) [m], lower corner of what the open fingers are around.
         high: (3,) [m], upper corner.
@@ -37,10 +37,9 @@ def closing_gap(body: Body, local: np.ndarray, low: np.ndarray, high: np.ndarray
     middles = (np.arange(LINES) + 0.5) / LINES
     steps = [low[k] + (high[k] - low[k]) * (middles + off) for k, off in zip(across, ASIDE, strict=True)]
     lines = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, 2)
-    where, line = _crossings(local, np.asarray(body.faces), lines, across, axis)
+    where, line = _crossings(local, faces, lines, across, axis)
     inside = (where > low[axis]) & (where < high[axis])
     layers = np.bincount(line[inside], minlength=len(lines))
-    material: Any = body.material
     if isinstance(material, Cloth):
         within = ((local >= low) & (local <= high)).all(axis=1).any()
         count = max(int(layers.max()), 2 if within and not layers.any() else 0)  # one that lies across them bunches up

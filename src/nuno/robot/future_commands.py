@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
 from nuno.errors import BodyStateError
+from nuno.robot.grip_order import GripOrder
 from nuno.robot.simulated_joints import Sent
 from nuno.robot.walk_order import WalkOrder
 
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from nuno.robot.gait import Gait
     from nuno.robot.humanoid import Humanoid
     from nuno.robot.servo import ServoCommand
+    from nuno.robot.simulated_gripper import SimulatedGripper
     from nuno.robot.simulated_joints import SimulatedJoints
     from nuno.world.world import World
 
@@ -26,6 +28,10 @@ class CommandedRobot(Protocol):
     actual: Humanoid
     joints: SimulatedJoints
     gait: Gait
+    grippers: dict[str, SimulatedGripper]
+
+    def follow_grips(self, waiting: Sequence[GripOrder], given: Sequence[GripOrder], later: float) -> bool:
+        """Let its hands do from now on what those of a copy were told; return whether that is anything."""
 
     def saved(self) -> tuple[Any, Any, Any, Any]:
         """Return its state, what is wanted of it, its servo command, and what was found of its way."""
@@ -55,7 +61,15 @@ def future_commands(robot: CommandedRobot, futures: World, k: int) -> Callable[[
     under_way, servo, given = copies.commanded_in(k)
     _, _, joints, gait = under_way
     goes_on, passed = robot.joints.are_as(joints), robot.joints.clock - joints[0][0]
-    sent = [own for own in given if isinstance(own, Sent)]
+    # in whose controllers a hand's order takes the place of what came before
+    sent = [Sent(own.clock, own.controller, None) if isinstance(own, GripOrder) and own.controller else own
+            for own in given]  # fmt: skip
+    sent = [own for own in sent if isinstance(own, Sent)]
+    hands, waiting = copies.hands_under_way()
+    if not goes_on:  # a hand that was under way is told anew, in place of what was left of its motion
+        busy = [robot.grippers[hand].controller for hand, own in hands.items() if robot.grippers[hand].was_busy(own)]
+        sent = [*(Sent(joints[0][0], controller, None) for controller in busy if controller), *sent]
+    grips = [own for own in given if isinstance(own, GripOrder)]
     orders = [own for own in given if isinstance(own, WalkOrder)]
     if not goes_on and robot.gait.is_walking:
         raise BodyStateError(f"{name!r} walks, and these futures were imagined earlier: wait until it stands")
@@ -69,6 +83,9 @@ def future_commands(robot: CommandedRobot, futures: World, k: int) -> Callable[[
         if servo is not robot.saved()[2]:
             robot.servo(None if servo is None else servo.command)
         moves = robot.joints.follow(joints, sent) or robot.gait.is_walking or robot.gait.awaits
+        moves = robot.follow_grips(waiting, grips, 0.0 if goes_on else passed) or moves
+        for hand, saved in hands.items():
+            robot.grippers[hand].go_on(saved, goes_on)
         if not moves and servo is None:
             logger.warning("%r was told nothing in future %d, and holds its joints where they are", name, k)
 

@@ -16,11 +16,10 @@ from nuno.robot.goal import Goal, GoalStatus, ResultCode
 from nuno.robot.preview_control import TICK
 from nuno.robot.robot_model import standing_place
 from nuno.robot.robot_state import RobotState
-from nuno.robot.running_walk import RunningWalk, landing_after, run_on, set_off
+from nuno.robot.running_walk import RunningWalk, landing_after
 from nuno.robot.simulated_joints import SimulatedJoints
 from nuno.robot.walk import TimedMotion, Walk
 from nuno.robot.walk_order import SOON, Place, WalkOrder, queued
-from nuno.robot.walk_planner import MARGIN, WalkPlanner
 from nuno.robot.walk_plans import WalkPlans
 
 if TYPE_CHECKING:
@@ -201,7 +200,10 @@ class Gait:
                 self.cancel()
                 continue
             goal = Goal(order.place)
-            self.go(goal, *order.place, order.seconds)
+            if order.hold is None:
+                self.go(goal, *order.place, order.seconds)
+            else:
+                goal = self.drive(*order.place, order.hold)
             if goal.status == GoalStatus.REJECTED:
                 logger.warning("%r did not go where it went in a future: %s", self._robot.name, goal.text)
 
@@ -250,12 +252,9 @@ class Gait:
         return goal
 
     def _set_off(self, goal: Goal, velocity: np.ndarray, until: float) -> None:
-        try:
-            walk: RunningWalk | str = set_off(WalkPlanner(self._robot, None, None, None, MARGIN, True), velocity)
-            if self.looks is not None and not isinstance(walk, str) and (met := self.looks(walk, 0.0)) is not None:
-                walk = str(met)
-        except NunoError as error:
-            walk = str(error)
+        walk = self.plans.set_off(self._robot, velocity)
+        if self.looks is not None and not isinstance(walk, str) and (met := self.looks(walk, 0.0)) is not None:
+            walk = str(met)
         self.begin(walk, goal)
         if isinstance(walk, RunningWalk):
             self._drive = Drive(velocity, until, landing_after(walk, 0))
@@ -268,7 +267,7 @@ class Gait:
             velocity = self._drive.now(self._start + at * TICK)
             try:
                 if velocity.any() or not (isinstance(walk, RunningWalk) and walk.is_closing):
-                    changed = run_on(walk, at, velocity)
+                    changed = self.plans.run_on(walk, at, velocity)
                     if velocity.any() and self.looks is not None:
                         met = self.looks(changed, at * TICK)
                         if met is not None:  # as it is, the walk was found to be free

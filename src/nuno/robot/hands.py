@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,12 +18,13 @@ from nuno.robot.description import HandOnFrame
 from nuno.robot.fingers import CLOSING
 from nuno.robot.placement import pose_of
 from nuno.shapes.coordinates import Coordinates, Pose, compose, invert
-from nuno.shapes.surface import SurfacePoints
+from nuno.shapes.surface import SurfacePoints, closest_points
 from nuno.validation import checked, number
 
 if TYPE_CHECKING:
     from nuno.robot.links import Links
     from nuno.robot.robot_state import Contacts
+    from nuno.world.world import World
 
 PROBES = 5
 """Points along each side of the closing volume from which the nearest surface is looked for."""
@@ -93,8 +94,7 @@ class Hand:
         own = self.description
         if own.joint is None:
             return own.width
-        robot = self.links.robot
-        angle = robot.angle_vector()[robot.joint_index(own.joint)]
+        angle = self._joint_angles()[self.links.robot.joint_index(own.joint)]
         return float(own.width * np.clip((angle - own.closed) / (own.open - own.closed), 0.0, 1.0))
 
     @checked
@@ -137,20 +137,19 @@ class Hand:
         Raises:
             BodyStateError: a body that is static or in another world, or links that have left theirs.
         """
-        world = self.links.world
+        world = self._world
         with world.lock:
             self.open()
             if self.presses:
                 return self.held
-            frame = Coordinates(*compose(self.body.pose(), self._offset))  # where the body is, not where it is sent
-            others = [b for b in world.bodies if b.is_dynamic and b not in self.links.bodies]
-            chosen = others if bodies is None else [world._own(b) for b in bodies]
+            chosen = self._others() if bodies is None else [world._own(b) for b in bodies]
+            frame, found = self._frame(), []
             for body in chosen:
                 where = self._inside(body, frame, width)
                 if where is not False:
-                    ignored = self._shapes if isinstance(body.material, Rigid) else None
-                    self._grips.append(world.grip(body, where, to=self.body, ignore=ignored))
-        return self.held
+                    self._take(body, where)
+                    found.append(body)
+        return tuple(found)
 
     @checked
     def gap(self, force: float = np.inf) -> float:
@@ -161,20 +160,20 @@ class Hand:
         Args:
             force: With which they press [N]; no more than the joint's effort gives.
         """
-        world, robot, joint = self.links.world, self.links.robot, self.description.joint
+        robot, joint = self.links.robot, self.description.joint
         if joint is None:
             return 0.0
         own = self.description
         limit = robot.effort_limits[robot.joint_index(joint)] * abs(own.closed - own.open) / max(own.width, 1e-9)
         force = min(force, float(limit) if limit > 0.0 else np.inf)
-        with world.lock:
-            frame, found = Coordinates(*compose(self.body.pose(), self._offset)), 0.0
+        with self._world.lock:
+            frame, found = self._frame(), 0.0
             low, high = self.volume(self.width)
-            for body in world.bodies:
-                if body.is_dynamic and body not in self.links.bodies:
-                    local = frame.to_local(body.vertices)
-                    if not ((local.max(axis=0) < low).any() or (local.min(axis=0) > high).any()):
-                        found = max(found, closing_gap(body, local, low, high, FINGERS, force))
+            for body in self._others():
+                local = frame.to_local(self._vertices(body))
+                if not ((local.max(axis=0) < low).any() or (local.min(axis=0) > high).any()):
+                    faces, material = np.asarray(body.faces), self._material(body)
+                    found = max(found, closing_gap(faces, material, local, low, high, FINGERS, force))
         return min(found, self.width)
 
     def open(self) -> None:
@@ -182,6 +181,10 @@ class Hand:
         for grip in self._grips:
             grip.release()
         self._grips = []
+
+    def take_grips(self, grips: Sequence[Grip]) -> None:
+        """Hold with these grips from now on, and let go of nothing."""
+        self._grips = list(grips)
 
     def take_over(self) -> None:
         """Hold what is gripped to the hand's link, as a file has it that the world was restored from."""
@@ -202,10 +205,40 @@ class Hand:
             self.links.robot.angle_vector(angles)
         return angles
 
+    # Inside, of the world that it is in
+
+    @property
+    def _world(self) -> World:
+        return self.links.world
+
+    def _joint_angles(self) -> np.ndarray:
+        """Return where the robot's joints are (n,)."""
+        return self.links.robot.angle_vector()
+
+    def _others(self) -> list[Body]:
+        """Return the bodies that it may take, or close on."""
+        return [body for body in self._world.bodies if body.is_dynamic and body not in self.links.bodies]
+
+    def _frame(self) -> Coordinates:
+        """Return its frame where the body is, not where it is sent."""
+        return Coordinates(*compose(self.body.pose(), self._offset))
+
+    def _vertices(self, body: Body) -> np.ndarray:
+        return body.vertices
+
+    def _material(self, body: Body) -> Any:
+        return body.material
+
+    def _take(self, body: Body, where: Any) -> None:
+        """Grip points of a body, or a rigid body as a whole."""
+        ignored = self._shapes if isinstance(body.material, Rigid) else None
+        self._grips.append(self._world.grip(body, where, to=self.body, ignore=ignored))
+
     def _inside(self, body: Body, frame: Coordinates, width: float | None) -> np.ndarray | SurfacePoints | bool | None:
         """Return the points of a body that are in the closing volume, None for a rigid body in it, else False."""
         low, high = self.volume(width)
-        local = frame.to_local(body.vertices)
+        vertices = self._vertices(body)
+        local = frame.to_local(vertices)
         if (local.max(axis=0) < low).any() or (local.min(axis=0) > high).any():
             return False
         rigid = isinstance(body.material, Rigid)
@@ -214,7 +247,7 @@ class Hand:
             return None if rigid else inside
         steps = [np.linspace(a, b, PROBES) for a, b in zip(low, high, strict=True)]
         probes = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, 3)
-        found = body.closest(frame.to_world(probes))
+        found = closest_points(frame.to_world(probes), vertices, body.faces)
         points = np.einsum("kc,kcx->kx", found.barycentric, local[body.faces[found.faces]])
         near = ((points >= low) & (points <= high)).all(axis=1)
         if not near.any():

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from nuno.robot.balance import Balance
     from nuno.robot.motion_batch import MotionBatch
     from nuno.robot.robot_state import RobotState
-    from nuno.robot.simulated_joints import Sent
     from nuno.robot.wanted_motion import WantedMotion
     from nuno.world.world import World
 
@@ -38,7 +37,7 @@ class ImaginedBase:
     balance: Balance | None
     _motions: list[WantedMotion]
     _states: list[RobotState]
-    _sent: list[tuple[Sent | WalkOrder, ...]]
+    _sent: list[tuple[Any, ...]]
     _together: MotionBatch
     _base_goals: list[Goal | None]
 
@@ -87,6 +86,37 @@ class ImaginedBase:
         return self._go((x, y, yaw), number("sec", sec, above=0.0), worlds, progress)
 
     @checked
+    def send_velocity(
+        self, x: ArrayLike, y: ArrayLike, yaw: ArrayLike, hold: float = 1.0, *, worlds: ArrayLike | None = None
+    ) -> np.ndarray:
+        """Keep a velocity until another comes, as from a joystick, and return which do, (k,) bool.
+
+        Each copy takes the newest at its next landing, and comes to rest ``hold`` after the last. Why one does not set
+        off, or keeps to what it did, a warning says by world, and ``base_goals`` tells.
+
+        Args:
+            x: Forward [m/s], one for all or (k,), one for each of ``worlds``.
+            y: To the left [m/s], likewise.
+            yaw: Counterclockwise [rad/s], likewise.
+            hold: How long it counts [s] where no other comes.
+            worlds: As of ``go_pos``.
+
+        Raises:
+            InvalidInputError: as ``go_pos``, or no time.
+            BodyStateError: a link was removed from the batch.
+        """
+        span = number("hold", hold, above=0.0)
+        with self.world.lock:
+            chosen = self._chosen_worlds(worlds)
+            goals = []
+            for w, (ahead, left, turn) in zip(chosen, self._ways((x, y, yaw), len(chosen)).tolist(), strict=True):
+                gait, clock = self._motions[w].gait, self._motions[w].joints.clock
+                gait.forget()
+                goals.append(gait.drive(ahead, left, turn, span))
+                self._sent[w] += (WalkOrder(clock, (ahead, left, turn), None, gait.walk, span),)
+            return self._set_off(chosen, goals)
+
+    @checked
     def go_stop(self, *, worlds: ArrayLike | None = None) -> None:
         """Let copies come to rest as soon as they safely can.
 
@@ -121,11 +151,7 @@ class ImaginedBase:
         """Set copies off on a way (3,) [m, m, rad], or at that a second for ``sec`` [s]."""
         with self.world.lock:
             chosen = self._chosen_worlds(worlds)
-            parts = [
-                np.broadcast_to(finite_array(name, value, (), (len(chosen),)), len(chosen))
-                for name, value in zip(("x", "y", "yaw"), way, strict=True)
-            ]
-            ways = (np.stack(parts, axis=1) * (1.0 if sec is None else sec)).tolist()
+            ways = (self._ways(way, len(chosen)) * (1.0 if sec is None else sec)).tolist()
             asked = list(zip(chosen, ways, strict=True))
             standing = [each for each in asked if not self._motions[each[0]].gait.is_walking]
             # kept until copies hold them, as robots that stand alike take the same
@@ -133,20 +159,33 @@ class ImaginedBase:
                 self._motions[w].gait.planned(x, y, yaw, sec)
                 for w, (x, y, yaw) in with_bar(standing, "planning walks", progress, "walk")
             ]
-            why: dict[str, list[int]] = {}
+            goals = []
             for w, (x, y, yaw) in asked:
                 gait, goal, clock = self._motions[w].gait, Goal((x, y, yaw)), self._motions[w].joints.clock
                 gait.forget()
                 gait.go(goal, x, y, yaw, sec)
-                self._base_goals[w] = goal if goal.status == GoalStatus.REJECTED else None
+                goals.append(goal)
                 self._sent[w] += (WalkOrder(clock, (x, y, yaw), sec, gait.walk),)
-                if goal.status == GoalStatus.REJECTED:
-                    why.setdefault(goal.text, []).append(w)
             del planned
+            return self._set_off(chosen, goals)
+
+    @staticmethod
+    def _ways(way: Sequence[ArrayLike], count: int) -> np.ndarray:
+        """Return ways or velocities (count, 3) that are given by x, y and yaw, each one for all or (count,)."""
+        parts = [finite_array(name, own, (), (count,)) for name, own in zip(("x", "y", "yaw"), way, strict=True)]
+        return np.stack([np.broadcast_to(own, count) for own in parts], axis=1)
+
+    def _set_off(self, chosen: list[int], goals: list[Goal]) -> np.ndarray:
+        """Keep the goals that were refused, tell of them, and return which were not, (k,) bool."""
+        why: dict[str, list[int]] = {}
+        for w, goal in zip(chosen, goals, strict=True):
+            refused = goal.status == GoalStatus.REJECTED
+            self._base_goals[w] = goal if refused else None
+            if refused:
+                why.setdefault(goal.text, []).append(w)
         for text, own in why.items():
             logger.warning("%r did not set off in worlds %s: %s", self.original.actual.name, own, text)
-        refused = {w for own in why.values() for w in own}
-        return np.array([w not in refused for w in chosen], dtype=bool)
+        return np.array([goal.status != GoalStatus.REJECTED for goal in goals], dtype=bool)
 
     def _chosen_worlds(self, worlds: Any) -> list[int]:
         """Return the copies that are to be told something, all brought up to date.

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from nuno.errors import BodyStateError, InvalidInputError, RobotModelError
 from nuno.robot.goal import Goal
 from nuno.robot.imagined_base import ImaginedBase
+from nuno.robot.imagined_hands import ImaginedHands
 from nuno.robot.imagined_sensors import ImaginedReadings, ImaginedSensors
 from nuno.robot.link_batch import LinkBatch
 from nuno.robot.motion_batch import MotionBatch
@@ -29,6 +30,7 @@ from nuno.validation import checked, finite_array, number
 if TYPE_CHECKING:
     from nuno.robot.balance import Balance
     from nuno.robot.gait import Gait
+    from nuno.robot.grip_order import GripOrder
     from nuno.robot.humanoid import Humanoid
     from nuno.robot.links import Links
     from nuno.robot.reported_joints import Angles
@@ -62,6 +64,9 @@ class OriginalRobot(Protocol):
     def is_dynamic(self) -> bool:
         """True where its links are moved by forces."""
 
+    def grip_orders(self) -> tuple[GripOrder, ...]:
+        """Return what its hands are to do later."""
+
     def saved(self) -> tuple[RobotState, Any, Any, Any]:
         """Return its state, what is wanted of it, its servo command, and what was found of its way."""
 
@@ -72,7 +77,7 @@ class OriginalRobot(Protocol):
         """Return the difference of two postures."""
 
 
-class ImaginedRobot(ImaginedBase):
+class ImaginedRobot(ImaginedBase, ImaginedHands):
     """A robot in every world of a batch: ``world.imagine(n).robot``.
 
     What is under way in the robot's world goes on in each of them. Commands may differ from world to world. Sensors are
@@ -97,7 +102,7 @@ class ImaginedRobot(ImaginedBase):
         state, motion, self._servo, found = original.saved() if of is None else of[0].saved_of(of[1])
         # what is under way as the robot itself is imagined, and what each copy was sent since
         self._under_way: Any = motion if of is None else of[0]._under_way
-        self._sent: list[tuple[Sent | WalkOrder, ...]] = [() if of is None else of[0]._sent[of[1]]] * world.world_count
+        self._sent: list[tuple[Any, ...]] = [() if of is None else of[0]._sent[of[1]]] * world.world_count
         self._warned_of_legs = False
         self._base_goals: list[Goal | None] = [None] * world.world_count  # of walks that were refused
         self._links = [world.find(body.name) for body in original.links.bodies]
@@ -106,11 +111,11 @@ class ImaginedRobot(ImaginedBase):
             self.balance = original.balance.imagined(world)
         self._states: list[RobotState] = [state] * world.world_count
         groups = {name: own.names for name, own in original.joints.controllers.items()}
-        self._motions = []
+        self._motions, goals = [], []
         for k in range(world.world_count):
             own = WantedMotion(original.wanted.copy(), groups, world.time)
             own.load(motion)
-            own.disown()
+            goals.append(own.disown())
             own.gait.plans, own.gait.bears = original.gait.plans, partial(self._carried, k)
             for name, controller in own.joints.controllers.items():
                 controller.near = original.joints.controllers[name].near
@@ -122,14 +127,17 @@ class ImaginedRobot(ImaginedBase):
             self._guards.append(MotionGuard(original.links, original.collisions, world, above, k))
             self._guards[k].load(found)
             own.gait.looks = self._guards[k].velocities_of(own)
-        if closing := [name for name, own in original.grippers.items() if of is None and own.will_hold]:
+        self._sensors: ImaginedSensors | None = None  # made when they are first read
+        alone = whole and world.engine.is_builtin and (of is None or bool(of[0].hands))
+        self._make_hands(of, goals, alone)
+        closing = [name for name, own in original.grippers.items() if of is None and own.will_hold]
+        if closing and not self.hands:
             logger.warning(
                 "%s of %r closes: its copies' fingers go on, but grip nothing there; imagine when it holds",
                 " and ".join(closing), original.actual.name,
             )  # fmt: skip
         self._before = self._states
         self._ground = original.sensors.ground
-        self._sensors: ImaginedSensors | None = None  # made when they are first read
         self._read: ImaginedReadings | None = None
         self._batch = LinkBatch(original.links, world, self._links)
         self._together = MotionBatch(original.actual, self._motions, self._guards)
@@ -283,13 +291,16 @@ class ImaginedRobot(ImaginedBase):
         """Return how many of the frames that end at ``ends`` [s] may be begun at once."""
         if not self._is_whole():
             return len(ends)
-        return 1 if self.balance is not None or self._servo is not None else self._together.look_ahead(start, ends)
+        if self.balance is not None or self._servo is not None:
+            return 1
+        return self._hands_ahead(self._together.look_ahead(start, ends))
 
     def begin_frame(self, start: float, end: float) -> None:
         """Set the motors for a frame, or send the links on their way; in all frames that were looked ahead to."""
         if not self._is_whole():
             return
         span, self._before = end - start, list(self._states)
+        self._take_up_grips()
         if self.balance is None:
             found = self._together.begin_ahead(start, end)
             if found is None:
@@ -297,6 +308,7 @@ class ImaginedRobot(ImaginedBase):
                 aims, angles = self._together.begin(end, span, servo)
                 found = aims, np.array([end]), np.array([[aim.q for aim in aims]]), angles[None]
             aims, *frames = found
+            self._angles = frames[2][-1]
             if span > 0.0:
                 if (frames[1] != np.array([state.q for state in self._states])).any():
                     self._batch.lead(start, *frames)
@@ -313,6 +325,7 @@ class ImaginedRobot(ImaginedBase):
             return
         if self.balance is None:
             self._together.end()
+            self._end_hands(self._angles)
             self._states = [
                 state if guard.met is None else replace(state, collision=guard.met)
                 for guard, state in zip(self._guards, self._states, strict=True)
@@ -333,11 +346,11 @@ class ImaginedRobot(ImaginedBase):
         found = [guard.save() for guard in self._guards]
         self._together.bring()
         motions, given = [own.save() for own in self._motions], (list(self._sent), list(self._base_goals))
-        return list(self._states), motions, joints, self._servo, found, given
+        return list(self._states), motions, joints, self._servo, found, given, self._save_hands()
 
     def load(self, saved: Any) -> None:
         """Become what it was when a snapshot was taken."""
-        states, motions, joints, self._servo, found, (sent, refused) = saved
+        states, motions, joints, self._servo, found, (sent, refused), hands = saved
         self._states, self._read, self._sent, self._base_goals = list(states), None, list(sent), list(refused)
         self._together.forget()
         for own, motion in zip(self._motions, motions, strict=True):
@@ -346,6 +359,7 @@ class ImaginedRobot(ImaginedBase):
             guard.load(own)
         if self.balance is not None:
             self.balance.dynamics.load(joints)
+        self._load_hands(hands)
 
     def imagined(self, futures: World, world: int) -> ImaginedRobot | None:
         """Return the copies of one world's robot in a batch that was imagined from that world; None without links."""

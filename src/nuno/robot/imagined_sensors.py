@@ -69,6 +69,11 @@ class ImaginedSensors(Sensors):
             LinkLoads(links, groups, reader=self._reader, bodies=bodies, index=k) for k in range(world.world_count)
         ]
 
+    def forget(self, worlds: np.ndarray) -> None:
+        """Read anew in some worlds (worlds,) bool, where something is held otherwise than before."""
+        for k in np.flatnonzero(worlds).tolist():
+            self._of_worlds[k].forget()
+
     def read_worlds(self, states: Sequence[RobotState], time: float) -> ImaginedReadings:
         """Return what the sensors tell of each world's robot.
 

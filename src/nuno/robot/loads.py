@@ -10,13 +10,14 @@ import numpy as np
 
 from nuno.bodies.body import Body
 from nuno.dynamics.dynamics import ParticleDynamics, dynamics_of
-from nuno.joints.held_points import held_points
+from nuno.joints.held_points import held_points, holds_in
 from nuno.materials import Cloth
 from nuno.robot.ground import moment
 from nuno.robot.static_boxes import StaticBoxes
 from nuno.robot.world_reader import WorldReader, of_world
 
 if TYPE_CHECKING:
+    from nuno.joints.grip import Grip
     from nuno.robot.links import Links
 
 NEAR = 4e-3
@@ -98,7 +99,7 @@ class LinkLoads:
         with world.lock:
             self._follow()
             moving = self._moving()
-            now = (world.time, tuple(grip.key for body in moving for grip in moving[body].grips))
+            now = (world.time, tuple(grip.key for own in moving.values() for grip in self._grips_of(own)))
             if now != self._read_at:
                 self._loads = tuple(load for body, dynamics in moving.items() for load in self._of(body, dynamics))
                 self._reader.keep_only(list(moving))
@@ -115,8 +116,12 @@ class LinkLoads:
             self._follow()
             self._noted = {}
             for body, dynamics in self._moving().items():
-                if isinstance(dynamics, ParticleDynamics) and _has_momentum(dynamics):
+                if isinstance(dynamics, ParticleDynamics) and self._has_momentum(dynamics):
                     self._noted[body] = self._motion_of(dynamics, self._reader.rows(body, dynamics.solver, self._k))
+
+    def forget(self) -> None:
+        """Forget what was, before the next reading: something is held otherwise in this world than before."""
+        self._version = None
 
     def _follow(self) -> None:
         """Forget what was, where bodies may have been put elsewhere, or the world restored, since it was read."""
@@ -131,6 +136,14 @@ class LinkLoads:
         bodies = [body for body in self._world._bodies.values() if body.is_dynamic and body not in self._index]
         return {body: dynamics_of(body) for body in bodies}
 
+    def _grips_of(self, dynamics: Any) -> list[Grip]:
+        """Return the grips that hold a body in this world."""
+        return [grip for grip in dynamics.grips if holds_in(grip.spec, self._k)]
+
+    def _has_momentum(self, dynamics: ParticleDynamics) -> bool:
+        """Return True if a body's momentum tells what bears it: what it is tied to has some of it else."""
+        return not any(grip.is_tie for grip in self._grips_of(dynamics))
+
     def _motion_of(self, dynamics: ParticleDynamics, rows: np.ndarray) -> _Motion:
         return _motion_of(rows, of_world(dynamics.solver.mass, self._k), self._world.time)
 
@@ -139,7 +152,7 @@ class LinkLoads:
         if isinstance(dynamics, ParticleDynamics):
             rows = self._reader.rows(body, dynamics.solver, self._k)
             x = rows[:3]
-            if _has_momentum(dynamics):
+            if self._has_momentum(dynamics):
                 motion = self._motion_of(dynamics, rows)
                 before, self._motions[body] = self._motions.get(body), motion
                 noted = self._noted.pop(body, None)
@@ -147,12 +160,13 @@ class LinkLoads:
                     before = noted
         else:
             x = self._reader.places(body, self._k)
-        held_by = [self._index.get(grip.target) for grip in dynamics.grips if grip.target is not None]
+        grips = self._grips_of(dynamics)
+        held_by = [self._index.get(grip.target) for grip in grips if grip.target is not None]
         step = 0.0 if motion is None or before is None else motion.time - before.time
         known = 0.0 < step < 1.5 / self._world.frame_rate
         known = known and not any(body in coupled.bodies for coupled in self._world._stepping.last)
         holding = {None if k is None else self._groups[k] for k in held_by}
-        all_held = len(held_by) == len(dynamics.grips)
+        all_held = len(held_by) == len(grips)
         near = self._near(body, dynamics, x, holding.pop() if known and all_held and len(holding) == 1 else None)
         supports = [self._index[other] for other in near if other in self._index]
         bearing = supports + [k for k in held_by if k is not None]
@@ -167,7 +181,7 @@ class LinkLoads:
                 self._contacts[body] = []
                 return [self._one(bearing, missing)]
         loads, borne = [], np.zeros(6)
-        for grip in dynamics.grips:
+        for grip in grips:
             link = None if grip.target is None else self._index.get(grip.target)
             if link is not None or known:
                 own_force, own_torque = self._reader.wrench(grip, self._k)
@@ -210,17 +224,12 @@ class LinkLoads:
         margin = 0.5 * thickness + NEAR
         low, high = x.min(axis=1), x.max(axis=1)
         close = boxes.close_to(low, high, margin)
-        close = [k for k in close if self._world._rules.touch(body, boxes.bodies[k])]
+        close = [k for k in close if self._world._rules.touch(body, boxes.bodies[k], self._k)]
         held = [k for k in close if holding is not None and self._static_groups[k] == holding]
         others = [k for k in close if k not in held]
         if not dynamics.is_rigid:  # a large face of those may touch where no corner is
             others = [k for k in others if boxes.hold_any(k, x, low, high, margin)]
         return [boxes.bodies[k] for k in (*held, *others)]
-
-
-def _has_momentum(dynamics: ParticleDynamics) -> bool:
-    """Return True if a body's momentum tells what bears it: what it is tied to has some of it else."""
-    return not any(grip.is_tie for grip in dynamics.grips)
 
 
 def _motion_of(rows: np.ndarray, mass: np.ndarray, time: float) -> _Motion:

@@ -103,6 +103,12 @@ class MotionBatch:
         joints.clock, joints.motion, joints.desired = kept
         return max(len(ahead.ends), 1)
 
+    def angles_ahead(self, count: int) -> np.ndarray:
+        """Return where the joints are (count, n, m) in frames that were just looked ahead to; zeros where in none."""
+        if not self._ahead.joints:
+            return np.zeros((count, len(self._motions), len(self._robot.joint_names)))
+        return np.stack([motion[0] for _, motion, _ in self._ahead.joints[:count]])
+
     def begin_ahead(
         self, start: float, end: float
     ) -> tuple[list[RobotState], np.ndarray, np.ndarray, np.ndarray] | None:

@@ -183,8 +183,9 @@ class MotionGuard:
         """Return what to ask before a robot takes a velocity, see ``Gait.looks``."""
 
         def look(walk: RunningWalk, since: float) -> Collision | None:
+            dynamic = self._of is None and self._links.bodies[0].is_dynamic  # copies with dynamics have no guard
             # in the open nothing is worked out before it is walked
-            if self.mode != "stop" or not self._near_anything(motion):
+            if self.mode != "stop" or dynamic or not self._near_anything(motion):
                 return None
             met = self._on_walk(motion, walk, since, 1.0 / self._world.frame_rate)
             if met is not None:
@@ -212,7 +213,8 @@ class MotionGuard:
 
     def _near_anything(self, motion: WantedMotion) -> bool:
         """Return True if anything but planes may be in the way of the next steps."""
-        _, shapes = self._tools()
+        shapes = self._shapes()
+        shapes.key()  # which has what is there now
         now, place = np.array([self._world.time]), motion.robot.position
         for obstacle in shapes.obstacles:
             if obstacle.is_plane:

@@ -111,11 +111,14 @@ class RunningWalk(TimedMotion):
 
         It has been set off on already, so what fails its checks only there goes on, and the log tells of it.
         """
-        while self._done < min(tick + 2, len(self.times)):
-            try:
-                self._work_out(self._done + CHUNK)
-            except WalkError as error:
-                logger.warning("the robot comes to rest otherwise than it safely can: %s", error)
+        if self._done >= min(tick + 2, len(self.times)):
+            return
+        with self._planner.working:
+            while self._done < min(tick + 2, len(self.times)):
+                try:
+                    self._work_out(self._done + CHUNK)
+                except WalkError as error:
+                    logger.warning("the robot comes to rest otherwise than it safely can: %s", error)
 
     def states_at(self, tick: int) -> States:
         """Return the states of both passes of preview control at a tick, counted from the first."""
@@ -202,10 +205,15 @@ def run_on(walk: TimedMotion, at: int, velocity: np.ndarray) -> RunningWalk:
         WalkError: the robot cannot walk so.
         InvalidInputError: it is faster than the stride allows.
     """
-    planner, schedule = walk.planner, walk.schedule
+    planner = walk.planner
     assert isinstance(planner, WalkPlanner)
     k = at - round(float(walk.times[0]) / TICK)
-    states = walk.states_at(k)
+    with planner.working:
+        return _run_on(planner, walk, k, at, velocity)
+
+
+def _run_on(planner: WalkPlanner, walk: TimedMotion, k: int, at: int, velocity: np.ndarray) -> RunningWalk:
+    schedule, states = walk.schedule, walk.states_at(k)
     landed = next(k for k in range(len(schedule.steps)) if schedule.landing(k) == at) + 1
     after = schedule.at(landed)
     last = schedule.steps[landed - 1].foot

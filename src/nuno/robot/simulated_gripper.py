@@ -14,6 +14,8 @@ from nuno.robot.simulated_joints import SimulatedJoints
 from nuno.robot.trajectory import JointTrajectory
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from nuno.joints.grip import Grip
     from nuno.robot.finger_dynamics import FingerDynamics
     from nuno.robot.robot_state import Contacts
@@ -44,13 +46,16 @@ class SimulatedGripper:
         hand: The hand.
         joints: The robot's joints, of which the fingers' are some.
         fingers: The robot's fingers where they may have dynamics, or None.
+        is_copy: Whether it is one of many in imagined worlds, which tells nothing in the log.
 
     Attributes:
         effort: How hard the fingers are to press at most [N]; infinite before anybody said.
     """
 
-    def __init__(self, hand: Hand, joints: SimulatedJoints, fingers: FingerDynamics | None = None) -> None:
-        self.hand, self._joints, self._fingers = hand, joints, fingers
+    def __init__(
+        self, hand: Hand, joints: SimulatedJoints, fingers: FingerDynamics | None = None, is_copy: bool = False
+    ) -> None:  # fmt: skip
+        self.hand, self._joints, self._fingers, self._is_copy = hand, joints, fingers, is_copy
         self.goal: Goal | None = None
         self.effort = np.inf
         self._motion: Goal | None = None
@@ -58,20 +63,33 @@ class SimulatedGripper:
         self._aim, self._last, self._waited = hand.description.width, hand.description.width, 0
         self._hold: tuple[tuple[Grip, ...], float] = ((), 0.0)  # grips, and how far apart the fingers were with them
         joint = hand.description.joint
-        self._controller = next((name for name, own in joints.controllers.items() if joint in own.names), None)
+        self.controller = next((name for name, own in joints.controllers.items() if joint in own.names), None)
 
     @property
     def will_hold(self) -> bool:
         """Return True while a hand closes that is to grip what is between its fingers when they have."""
         return self._closes and self.goal is not None and not self.goal.is_done and not self.hand.presses
 
-    def send(self, position: float, effort: float = np.inf) -> Goal:
+    @property
+    def is_at_rest(self) -> bool:
+        """Return True if a frame in which the fingers do not move changes nothing."""
+        grips = self.hand.grips
+        ended = self.goal is None or self.goal.is_done or not (self._motion is None or self._motion.is_done)
+        return ended and (not grips or self.hand.description.joint is None or grips == self._hold[0])
+
+    @property
+    def loose(self) -> float:
+        """The width [m] beyond which the fingers let go of what they grip; infinite where they grip nothing."""
+        return self._hold[1] + LOOSE if self.hand.grips and self.hand.description.joint is not None else np.inf
+
+    def send(self, position: float, effort: float = np.inf, among_others: bool = False) -> Goal:
         """Let the hand open to ``position``, from 0 (closed) to 1, in place of what it does now.
 
         Args:
             position: From 0 (closed) to 1.
             effort: How hard the fingers press at most [N]; 0 is as hard as they can, as drivers take it that are told
                 nothing.
+            among_others: Whether what the fingers' controller was sent for later comes all the same.
         """
         if self.goal is not None:
             self.goal.finish(GoalStatus.PREEMPTED, text="another goal took its place")
@@ -91,7 +109,7 @@ class SimulatedGripper:
             self.hand.open()
         if self._closes and not self.hand.presses:  # nothing would stop the fingers but what is known of it
             width = max(width, min(self.hand.gap(effort), self.hand.width))
-        self._motion = self._move(self.hand.joint_angles(width))
+        self._motion = self._move(self.hand.joint_angles(width), among_others)
         return self.goal
 
     def end_frame(self, contacts: Contacts) -> None:
@@ -140,7 +158,45 @@ class SimulatedGripper:
         self._hold = motion[7]
         if self.goal is not None:
             self.goal.status, self.goal.text = status
-        self.hand._grips = list(grips)
+        self.hand.take_grips(grips)
+
+    @staticmethod
+    def was_busy(saved: tuple[Any, ...]) -> bool:
+        """Return True if a goal was under way when ``save`` returned that."""
+        return saved[0] is not None and saved[1][0] == GoalStatus.ACTIVE
+
+    def go_on(self, saved: tuple[Any, ...], goes_on: bool) -> None:
+        """Do what was under way when ``save`` returned that, in place of what came since.
+
+        Args:
+            saved: What it was then.
+            goes_on: Whether the joints are as they were then, and follow what they followed.
+        """
+        goal = saved[0]
+        if goes_on and self.goal is not goal:
+            if self.goal is not None:
+                self.goal.finish(GoalStatus.PREEMPTED, text="another goal took its place")
+            self.load(saved)
+        elif not goes_on and self.was_busy(saved):
+            self.send(goal.asked, saved[2][6], among_others=True)
+
+    def take_over(self, saved: tuple[Any, ...], goals: Mapping[int, Goal], grips: Mapping[str, Grip]) -> None:
+        """Become what another gripper of this hand was, in another world.
+
+        Args:
+            saved: What it was, as ``save`` tells it.
+            goals: Of the goals of its joints those that stand for them here, by ``id``; others are copied.
+            grips: Those of this world, by key.
+        """
+        goal, status, motion, held, pressed = saved
+        if self.goal is not None:
+            self.goal.finish(GoalStatus.PREEMPTED, text="a future was adopted")
+        own_goal = None if goal is None else goal.copy()
+        moves = motion[0] if motion[0] is None else goals.get(id(motion[0])) or motion[0].copy()
+        here = tuple(grips[grip.key] for grip in held if grip.key in grips)
+        before = motion[7][0], motion[7][1]
+        known = tuple(grips[grip.key] for grip in before[0] if grip.key in grips)
+        self.load((own_goal, status, (moves, *motion[1:7], (known, before[1])), here, pressed))
 
     def _let_go_where_opened(self) -> None:
         """Let go of what is held where a vector of joint angles, and no gripper's goal, opens the fingers."""
@@ -162,7 +218,8 @@ class SimulatedGripper:
         if wanted <= width + LOOSE:
             return
         names = " and ".join(sorted({body.name for body in held}))
-        logger.warning(
+        tell = logger.debug if self._is_copy else logger.warning
+        tell(
             "the %s of %r lets go of %s: %r was sent along and opens the fingers from %.3f m; send vectors in which "
             "that joint stays as it is (update_robot_state() and angle_vector() tell), or to one group of joints: "
             "angle_vector(angles, seconds, controller_type)", hand.name, hand.links.robot.name, names, joint, width,
@@ -183,15 +240,15 @@ class SimulatedGripper:
         self._waited += 1
         return self._waited < 2 or (abs(width - self._last) > STILL and self._waited < PATIENCE)
 
-    def _move(self, angles: dict[str, float]) -> Goal | None:
-        if self._controller is None or not angles:
+    def _move(self, angles: dict[str, float], among_others: bool) -> Goal | None:
+        if self.controller is None or not angles:
             return None
-        own = self._joints.controllers[self._controller]
-        rows = self._joints.rows[self._controller]
+        own = self._joints.controllers[self.controller]
+        rows = self._joints.rows[self.controller]
         wanted = self._joints.positions[rows].copy()
         for joint, angle in angles.items():
             wanted[own.names.index(joint)] = angle
         change = np.abs(wanted - self._joints.positions[rows])
         span = PEAK * float((change / self._joints.velocity_limits[rows]).max())
         trajectory = JointTrajectory(own.names, np.array([span]), wanted[None], np.zeros((1, len(wanted))))
-        return self._joints.send(self._controller, trajectory)
+        return self._joints.send(self.controller, trajectory, among_others=among_others)

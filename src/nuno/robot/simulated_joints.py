@@ -25,12 +25,12 @@ class Sent(NamedTuple):
     Attributes:
         clock: When [s] of the joints' clock.
         controller: The controller's name.
-        trajectory: What.
+        trajectory: What; None where something else is sent to it then, which takes the place of what was to come.
     """
 
     clock: float
     controller: str
-    trajectory: JointTrajectory
+    trajectory: JointTrajectory | None
 
 
 class SimulatedJoints:
@@ -240,10 +240,11 @@ class SimulatedJoints:
         self._ask(name)
 
     def send(
-        self, name: str, trajectory: JointTrajectory, start_time: float = 0.0, tolerances: Tolerances | None = None
-    ) -> Goal:
-        """Send a trajectory to a controller, to start ``start_time`` [s] from now."""
-        goal = self.controllers[name].accept(trajectory, self.clock, start_time, tolerances)
+        self, name: str, trajectory: JointTrajectory, start_time: float = 0.0, tolerances: Tolerances | None = None,
+        among_others: bool = False,
+    ) -> Goal:  # fmt: skip
+        """Send a trajectory to a controller, to start ``start_time`` [s] from now; see ``TrajectoryController``."""
+        goal = self.controllers[name].accept(trajectory, self.clock, start_time, tolerances, among_others)
         self._ask(name)
         return goal
 
@@ -261,7 +262,7 @@ class SimulatedJoints:
         """
         then, goes_on = saved[0][0], self.are_as(saved)
         for name, controller in self.controllers.items():
-            own = [Later(each.clock, each.trajectory) for each in sent if each.controller == name]
+            own = [Later(each.clock, each.trajectory) for each in sent if each.controller == name]  # type: ignore[arg-type]
             if goes_on:
                 controller.go_on(saved[1][name], own)
             else:

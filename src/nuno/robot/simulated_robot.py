@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time as wall_clock
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from nuno.errors import BodyStateError, InvalidInputError, UnknownNameError
 from nuno.robot.balance import Balance
 from nuno.robot.burden import Burden
 from nuno.robot.goal import Goal, GoalStatus, ResultCode, Tolerances
+from nuno.robot.grip_order import GripOrder, GripQueue
 from nuno.robot.hands import hands_of
 from nuno.robot.humanoid import Humanoid
 from nuno.robot.joint_interface import Controller
@@ -29,6 +30,7 @@ from nuno.robot.simulated_gripper import SimulatedGripper
 from nuno.robot.trajectory import JointTrajectory
 from nuno.robot.wanted_motion import WantedMotion
 from nuno.validation import checked, number
+from nuno.world.grips_of_worlds import drop_empty_grips, grips_by_key
 from nuno.world.pace import LATE
 
 if TYPE_CHECKING:
@@ -103,6 +105,7 @@ class SimulatedRobot(SimulatedBase):
         self.hands = hands_of(self.links)
         fingers = None if self.balance is None else self.balance.dynamics.fingers
         self.grippers = {name: SimulatedGripper(hand, self.joints, fingers) for name, hand in self.hands.items()}
+        self._grip_queue = GripQueue(self.grippers, self.joints)
         self.sensors = Sensors(self.actual, self.links, models=sensors, seed=seed)
         self._readings: tuple[float, Readings] | None = None
         self._cameras = SimulatedCameras(self.links, cameras)
@@ -250,6 +253,7 @@ class SimulatedRobot(SimulatedBase):
             self._check_there()
             if hand not in self.grippers:
                 raise UnknownNameError("hand", hand, list(self.grippers))
+            self._grip_queue.forget(hand)
             return self.grippers[hand].send(position, effort)
 
     # What the world asks of it
@@ -257,6 +261,7 @@ class SimulatedRobot(SimulatedBase):
     def begin_frame(self, start: float, end: float) -> None:
         """Send the links to where the robot is at the end of the frame, or, with dynamics, set their motors."""
         self.gait.take_up()
+        self._grip_queue.take_up()
         span, before, self._before = end - start, self._motion.aim, self._state
         servo = None if self._servo is None or self.is_dynamic else self._serve
         if span > 0.0 and not self.is_dynamic:
@@ -305,11 +310,12 @@ class SimulatedRobot(SimulatedBase):
         """Return all that it is, for a snapshot."""
         grippers = {name: gripper.save() for name, gripper in self.grippers.items()}
         joints = () if self.balance is None else self.balance.dynamics.save()
-        return self._state, self._motion.save(), joints, grippers, self._servo, self.guard.save(), self._burden.save()
+        hands, guard = (grippers, self._grip_queue.waiting), self.guard.save()
+        return self._state, self._motion.save(), joints, hands, self._servo, guard, self._burden.save()
 
     def load(self, saved: Any) -> None:
         """Become what it was when a snapshot was taken; goals that came since are given up."""
-        self._state, motion, joints, grippers, self._servo, guard, burden = saved
+        self._state, motion, joints, (grippers, self._grip_queue.waiting), self._servo, guard, burden = saved
         self._motion.load(motion)
         if self.balance is not None:
             self.balance.dynamics.load(joints)
@@ -321,6 +327,15 @@ class SimulatedRobot(SimulatedBase):
         self._readings = None
         self.guard.load(guard)
         self._burden.load(burden)
+
+    def grip_orders(self) -> tuple[GripOrder, ...]:
+        """Return what its hands are to do later, for its copies."""
+        return self._grip_queue.waiting
+
+    def follow_grips(self, waiting: Sequence[GripOrder], given: Sequence[GripOrder], later: float) -> bool:
+        """Let its hands do from now on what those of a copy were told; see ``GripQueue.follow``."""
+        self._grip_queue.follow(waiting, given, later)
+        return bool(self._grip_queue.waiting)
 
     def saved(self) -> tuple[RobotState, Any, Any, Any]:
         """Return its state, what is wanted of it, its servo command, and what was found of its way, for its copies."""
@@ -341,10 +356,15 @@ class SimulatedRobot(SimulatedBase):
                     self.balance.dynamics.take(None if copies is None else copies.dynamics)
                 joints = () if self.balance is None else self.balance.dynamics.save()
                 state, motion, servo, guard = other.saved_of(k)  # type: ignore[attr-defined]
-                grippers = {name: gripper.save() for name, gripper in self.grippers.items()}
-                self.load((state, motion, joints, grippers, servo, guard, self._burden.save()))
-                self._motion.disown()
+                hands = self.save()[3]
+                self.load((state, motion, joints, hands, servo, guard, self._burden.save()))
+                goals = self._motion.disown()
                 self._base_goal = self.gait.goal
+                drop_empty_grips(self.world, self.links.bodies)
+                if (copied := other.grippers_of(k)) is not None:  # type: ignore[attr-defined]
+                    for name, gripper in self.grippers.items():
+                        gripper.take_over(copied[0][name], goals, grips_by_key(self.world))
+                    self._grip_queue.waiting = copied[1]
 
     def future_commands(self, futures: World, k: int) -> Callable[[], None]:
         """Return what lets the robot do from now on what its copy in one world of a batch was told to."""

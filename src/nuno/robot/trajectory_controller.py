@@ -63,7 +63,7 @@ class Later:
 
     Attributes:
         start: When [s] of the controller's clock.
-        trajectory: What.
+        trajectory: What; None only while it is put among others, where something else takes their place then.
     """
 
     start: float
@@ -118,9 +118,13 @@ class TrajectoryController:
         return float(earliest - 2.0 * SOON)
 
     def accept(
-        self, trajectory: JointTrajectory, now: float, start_time: float = 0.0, tolerances: Tolerances | None = None
-    ) -> Goal:
-        """Take a trajectory that starts ``start_time`` [s] from ``now`` [s]; what cannot be followed is rejected."""
+        self, trajectory: JointTrajectory, now: float, start_time: float = 0.0, tolerances: Tolerances | None = None,
+        among_others: bool = False,
+    ) -> Goal:  # fmt: skip
+        """Take a trajectory that starts ``start_time`` [s] from ``now`` [s]; what cannot be followed is rejected.
+
+        What was sent for later is given up, but where it is one ``among_others``.
+        """
         goal = Goal(trajectory)
         strangers = set(trajectory.names) ^ set(self.names)
         wanted = tolerances or Tolerances()
@@ -137,7 +141,7 @@ class TrajectoryController:
             logger.warning("a goal was rejected: %s", goal.text)
             return goal
         self._take_goal(goal, wanted)
-        self._later = ()
+        self._later = self._later if among_others else ()
         start = now + start_time
         self._next = (start, max(start, now), self._within_limits(trajectory.of(self.names)))
         self.advance(now)
@@ -350,8 +354,9 @@ def _queued(waiting: Sequence[Later], sent: Sequence[Later]) -> tuple[Later, ...
     """Return what waits, and what is sent, each of which takes the place of all that waits at its time."""
     queue = list(waiting)
     for own in sent:
-        queue = [*(before for before in queue if before.start <= own.start + SOON), own]
-    return tuple(queue)
+        until = own.start + (SOON if own.trajectory is not None else -SOON)
+        queue = [*(before for before in queue if before.start <= until), own]
+    return tuple(own for own in queue if own.trajectory is not None)
 
 
 def _rest_of(spline: Spline, time: float) -> JointTrajectory | None:

@@ -25,12 +25,14 @@ class WalkOrder:
         place: Ahead, to the left [m], counterclockwise [rad], seen from where the robot was then; None to come to rest.
         seconds: In which it is to cover that [s]; None as it walks by itself.
         walk: The walk that came of it, so that whoever stands so takes it as it is; None where there is none.
+        hold: Where ``place`` is a velocity [m/s, rad/s] to keep, for how long [s]; None where it is a place.
     """
 
     clock: float
     place: Place | None
     seconds: float | None = None
     walk: TimedMotion | None = None
+    hold: float | None = None
 
 
 def queued(waiting: Sequence[WalkOrder], given: Iterable[WalkOrder], later: float = 0.0) -> tuple[WalkOrder, ...]:

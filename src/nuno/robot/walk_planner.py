@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -64,6 +65,7 @@ class WalkPlanner:
         look_for_collisions: bool,
     ) -> None:  # fmt: skip
         self.robot = robot.copy()
+        self.working = threading.RLock()  # it has one place to work in, and copies in other threads share its walks
         self.stride = Stride.of(robot) if stride is None else stride
         self.margin, self.look_for_collisions = number("margin", margin), look_for_collisions
         self.model = _loaded(robot.model, load)
@@ -95,12 +97,13 @@ class WalkPlanner:
         robot, legs = copy.copy(self.robot), copy.copy(self.legs)
         robot.__dict__.pop("geometry", None)
         robot.data = robot.scratch = legs.data = None
-        return self.__dict__ | {"robot": robot, "legs": legs}
+        return {**self.__dict__, "robot": robot, "legs": legs, "working": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
         self.legs.data = self.model.createData()
         self.robot = self.robot.copy()
+        self.working = threading.RLock()
 
     def first(self, steps: tuple[Footstep, ...]) -> Walk:
         """Return the walk over steps, from standing."""

@@ -9,7 +9,9 @@ from weakref import WeakKeyDictionary, WeakValueDictionary
 import numpy as np
 
 from nuno.errors import NunoError
-from nuno.robot.walk import Walk
+from nuno.robot.running_walk import RunningWalk, run_on, set_off
+from nuno.robot.walk import TimedMotion, Walk
+from nuno.robot.walk_planner import MARGIN, WalkPlanner
 from nuno.robot.walking import continue_walk, plan_walk, plan_walk_velocity, stop_walk
 
 if TYPE_CHECKING:
@@ -28,8 +30,9 @@ class WalkPlans:
 
     def __init__(self) -> None:
         self._walks: WeakValueDictionary[tuple[Any, ...], Walk] = WeakValueDictionary()
+        self._running: WeakValueDictionary[tuple[Any, ...], RunningWalk] = WeakValueDictionary()
         self._refused: dict[tuple[Any, ...], str] = {}
-        self._changed: WeakKeyDictionary[Walk, WeakValueDictionary[tuple[float, ...], Walk]] = WeakKeyDictionary()
+        self._changed: WeakKeyDictionary[Any, WeakValueDictionary[tuple[Any, ...], Any]] = WeakKeyDictionary()
         self._changing = threading.Lock()  # a planner has one place to work in, and worlds may have threads
 
     def plan(
@@ -72,7 +75,7 @@ class WalkPlans:
             found = known.get((time,))
             if found is None:
                 found = known[time,] = stop_walk(walk, time)
-            return found
+            return found  # type: ignore[no-any-return]
 
     def go_on(self, walk: Walk, time: float, x: float, y: float, yaw: float, seconds: float) -> Walk:
         """Return how a walk goes on otherwise from a time [s] of it on, covering a way [m, rad] in ``seconds`` [s].
@@ -86,4 +89,31 @@ class WalkPlans:
             found = known.get(key)
             if found is None:
                 found = known[key] = continue_walk(walk, time, x / seconds, y / seconds, yaw / seconds, seconds)
+            return found  # type: ignore[no-any-return]
+
+    def set_off(self, robot: Humanoid, velocity: np.ndarray) -> RunningWalk | str:
+        """Return the walk at a velocity (3,) [m/s, m/s, rad/s] from where a robot stands, or why there is none."""
+        key = (robot.configuration().tobytes(), robot.angle_vector().tobytes(), velocity.tobytes())
+        with self._changing:
+            found = self._running.get(key)
+            if found is None:
+                try:
+                    found = set_off(WalkPlanner(robot, None, None, None, MARGIN, True), velocity)
+                except NunoError as error:
+                    return str(error)
+                self._running[key] = found
             return found
+
+    def run_on(self, walk: TimedMotion, at: int, velocity: np.ndarray) -> RunningWalk:
+        """Return the walk that goes on at a velocity (3,) from a landing (tick) of another; see `run_on`.
+
+        Raises:
+            NunoError: as `run_on`.
+        """
+        key = (at, velocity.tobytes())
+        with self._changing:
+            known = self._changed.setdefault(walk, WeakValueDictionary())
+            found = known.get(key)
+            if found is None:
+                found = known[key] = run_on(walk, at, velocity)
+            return found  # type: ignore[no-any-return]

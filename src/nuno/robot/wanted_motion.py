@@ -15,6 +15,7 @@ from nuno.robot.stance import Stance
 from nuno.robot.trajectory import Motion
 
 if TYPE_CHECKING:
+    from nuno.robot.goal import Goal
     from nuno.robot.humanoid import Humanoid
 
 Servo = Callable[[RobotState, Motion, "np.ndarray | None", float], tuple[np.ndarray, Motion]]
@@ -139,11 +140,18 @@ class WantedMotion:
         self.joints.load(joints)
         self.gait.load(gait)
 
-    def disown(self) -> None:
-        """Take copies in place of the goals: those of whoever it was loaded from stay as they are."""
+    def disown(self) -> dict[int, Goal]:
+        """Take copies in place of the goals, and return those of the joints by the ``id`` of what they stand for.
+
+        The goals of whoever it was loaded from stay as they are.
+        """
+        copied = {}
         for controller in self.joints.controllers.values():
-            controller.goal = None if controller.goal is None else controller.goal.copy()
+            if controller.goal is not None:
+                goal, controller.goal = controller.goal, controller.goal.copy()
+                copied[id(goal)] = controller.goal
         self.gait.disown()
+        return copied
 
     def _pose(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         robot = self.robot

@@ -98,7 +98,8 @@ class Coupling(CouplingResults):
         self._firsts, total = [int(first) for first in firsts[:-1]], int(firsts[-1])
         self._layouts: list[Layout] = []
         self._particles = self._room(total)
-        self._particles.held = wp.array(held_slots(numbers.size, holds, joints), dtype=int, device=self.device)
+        held = held_slots(self.world_count, numbers.size, holds, joints)
+        self._particles.held = wp.array(held, dtype=int, device=self.device)
         self._start = wp.zeros(max(1, self.world_count * total), dtype=wp.vec3, device=self.device)
         self._cells = np.array([s.cell_size for s in solvers] + [np.inf] * (self._bodies - len(self._solvers)))
         self._radii = elements.radius.numpy().reshape(self.world_count, self._bodies).T.astype(float)

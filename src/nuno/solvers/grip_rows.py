@@ -65,10 +65,11 @@ def grip_rows(grips: Sequence[GripSpec], origin: np.ndarray, inverse_mass: np.nd
     held_inverse_mass = np.ones((worlds, count), dtype=np.float32)
     for g, e in enumerate(entries):
         corner[:, g], weight[:, g] = e["corners"], e["weights"]
-        m = len(e["times"])
-        times[g] = np.concatenate([e["times"], np.full(keys - m, e["times"][-1])])
-        place[:, g, :m] = e["positions"]
-        place[:, g, m:] = e["positions"][:, -1:]
+        # the first key as often as there are more of another grip: what is led has the same bits beside any other
+        more = keys - len(e["times"])
+        times[g] = np.concatenate([np.full(more, e["times"][0]), e["times"]])
+        place[:, g, more:] = e["positions"]
+        place[:, g, :more] = e["positions"][:, :1]
         if e["fixed"]:
             held = np.nonzero(e["corners"][:, 0] >= 0)[0]
             mass[held, e["corners"][held, 0]] = 0.0

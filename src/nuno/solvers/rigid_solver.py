@@ -35,6 +35,9 @@ BLOCK_THREADS = 256
 GROUP_PARTS = 160
 """Parts from which on a block group takes less time than one (an H200; 105 take more, 205 less)."""
 
+UNTOUCHED, NO_EXCEPTION = -1.0, -2.0
+"""In place of a pair's friction: that they do not touch, or that the pair is no exception in this world."""
+
 DYNAMIC, MOVED = 1, 2
 PHASES = {"all": 0, "predict": 1, "contacts": 2, "finish": 3}
 
@@ -202,11 +205,11 @@ class RigidSolver(RigidContacts):
         self._list_anew()
 
     def set_exceptions(self, pairs: Mapping[tuple[int, int], Any]) -> None:
-        """Set what holds for pairs of slots: a friction coefficient, one or (worlds,), or None: they do not touch."""
+        """Set what holds for pairs of slots: friction, one or (worlds,), in some `NO_EXCEPTION`; None: no contact."""
         keyed = sorted(((min(a, b) << 32) | max(a, b), mu) for (a, b), mu in pairs.items())
         self.rules.exceptions = len(keyed)
         self.rules.pair = wp.array(np.array([key for key, _ in keyed] or [0], np.int64), device=self.device)
-        values = [np.broadcast_to(-1.0 if mu is None else mu, (self.world_count,)) for _, mu in keyed]
+        values = [np.broadcast_to(UNTOUCHED if mu is None else mu, (self.world_count,)) for _, mu in keyed]
         table = np.stack(values, axis=1) if keyed else np.zeros((self.world_count, 1))
         self.rules.pair_friction = wp.array(table.astype(np.float32).ravel(), dtype=float, device=self.device)
         self._list_anew()

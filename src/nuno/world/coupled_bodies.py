@@ -42,6 +42,7 @@ class CoupledBodies(CoupledTables):
         super().__init__(world, group, ties)
         self.kept: dict[Body, np.ndarray] = {}
         self._dynamics: list[Any] = [body._dynamics for body in self.bodies]
+        self._held = [grip.spec for grip in self._frame_holds]
         solvers = [body._dynamics.solver for body in self.particles]  # type: ignore[union-attr]
         scene = world._rigid
         elements = self._make_surfaces()
@@ -64,8 +65,9 @@ class CoupledBodies(CoupledTables):
         )
 
     def is_current(self) -> bool:
-        """Return True if the solvers still are those that the tables speak of."""
+        """Return True if solvers and holds still are those that the tables speak of."""
         same = all(body._dynamics is own for body, own in zip(self.bodies, self._dynamics, strict=True))
+        same = same and all(grip.spec is own for grip, own in zip(self._frame_holds, self._held, strict=True))
         rigid = self._world._rigid
         return same and (not self.rigid or (rigid is not None and rigid.solver.state.capacity == self._capacity))
 

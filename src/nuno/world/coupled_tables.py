@@ -12,6 +12,7 @@ from nuno.coupled.tie_constraints import Holds, Ties
 from nuno.dynamics.dynamics import ParticleDynamics, touches_itself
 from nuno.dynamics.rigid_dynamics import RigidDynamics
 from nuno.joints.grip import Grip, GripSpec
+from nuno.joints.held_points import holding
 from nuno.joints.tie import HoldSpec, TieSpec, corners_of
 from nuno.rigid.convex import BOX_PART, CAPSULE_PART, CYLINDER_PART, HULL, SPHERE_PART
 from nuno.rigid.ridges import Ridges, ridges_of
@@ -230,7 +231,8 @@ class CoupledTables:
         for name in ("pull", "twist", "total", "total_twist"):
             setattr(holds, name, wp.zeros(room, dtype=wp.vec3, device=device))
         holds.unmet = wp.zeros(room, dtype=int, device=device)
-        most = np.stack([_limits(grip, worlds) for grip in self._frame_holds] or [np.zeros(worlds)], axis=1)
+        limits = [np.where(holding(grip.spec, worlds), _limits(grip, worlds), -1.0) for grip in self._frame_holds]
+        most = np.stack(limits or [np.zeros(worlds)], axis=1)
         holds.limit = wp.array(most.astype(np.float32).ravel(), dtype=float, device=device)
         return holds
 

@@ -12,11 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nuno.joints.tie import TieSpec
+from nuno.joints.held_points import holding
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
-    from nuno.joints.grip import Grip
     from nuno.world.simulation import Simulation
 
 GROWTH = 1.5
@@ -76,20 +75,13 @@ def find_islands(
         for grip in body._dynamics.grips:  # type: ignore[union-attr]
             if grip.is_tie and grip.target in place:
                 a, b = sorted((place[body], place[grip.target]))
-                joined[a, b] |= holding(grip, world.world_count)
+                joined[a, b] |= holding(grip.spec, world.world_count)
     first = _connected(joined)
     if substeps is None:
         substeps = np.array([body._dynamics.substeps for body in moving])[:, None]  # type: ignore[union-attr]
     most, column = np.zeros_like(first), np.arange(world.world_count)
     np.maximum.at(most, (first, column), np.broadcast_to(substeps, first.shape))
     return Islands(first, most[first, column])
-
-
-def holding(grip: Grip, worlds: int) -> np.ndarray:
-    """Return (worlds,) bool, where a tie or hold holds anything."""
-    spec = grip.spec
-    held = (spec.corners >= 0).any(axis=(1, 2)) if isinstance(spec, TieSpec) else True
-    return np.array(np.broadcast_to(held, (worlds,)))
 
 
 def _connected(joined: np.ndarray) -> np.ndarray:

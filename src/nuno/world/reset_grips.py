@@ -27,8 +27,6 @@ def merged_grips(
     """
     saved = {record.key: record for record in snapshot.grips}
     by_key = {body.key: body for body in records}
-    keys = {record.key: max([len(g.spec.times) for g in snapshot.grips if g.body == record.key
-                             and isinstance(g.spec, GripSpec)], default=1) for record in records.values()}  # fmt: skip
     changed, back = [], []
     for dynamics in world._attached():
         for grip in dynamics.grips:
@@ -43,7 +41,7 @@ def merged_grips(
             ):
                 raise BodyStateError(f"the grip on {name!r} leads it in another way than in the snapshot")
             origin = _origin(records[grip.body], at)
-            end = None if grip.is_tie else _end_of(origin, keys[grip.body.key])
+            end = None if grip.is_tie else _end_of(origin)
             spec = merge_spec(grip.spec, record.spec, at, name, end)
             offsets = _merged_parts(grip.offsets, record.offsets, at)
             changed.append((grip, spec, offsets, _followed(grip, record, at)))
@@ -60,13 +58,13 @@ def _origin(record: BodyRecord, at: WorldRows) -> np.ndarray:
     return np.asarray(record.dynamics.state.get("origin", np.zeros((1, 3))), dtype=np.float64)
 
 
-def _end_of(origin: np.ndarray, keys: int) -> Any:
+def _end_of(origin: np.ndarray) -> Any:
     """Return what gives the places where an ended path holds its points, to the bit of the kernel that leads them."""
 
     def end(spec: GripSpec) -> np.ndarray:
         local = (spec.positions - origin[:, None, None]).astype(np.float32)
         last = local[:, :, -1]
-        if 1 < spec.positions.shape[2] == keys:
+        if spec.positions.shape[2] > 1:
             last = local[:, :, -2] + (local[:, :, -1] - local[:, :, -2])
         return last.astype(np.float64) + origin[:, None]
 

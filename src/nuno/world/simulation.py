@@ -21,6 +21,7 @@ from nuno.engines.engine import Engine
 from nuno.engines.engine_registry import make_engine
 from nuno.errors import BodyStateError, InvalidInputError, UnknownNameError
 from nuno.joints.grip import Grip
+from nuno.joints.held_points import holding, released
 from nuno.joints.joint import Joint
 from nuno.materials import Rigid
 from nuno.tables.kinematic_motion import Schedule, is_kinematic, make_schedule, path_batches_of
@@ -231,35 +232,54 @@ class Simulation:
         dynamics.release()
         self._colliders_changed()
 
-    def _hold(self, grip: Grip) -> None:
+    def _hold(self, grip: Grip, worlds: np.ndarray | None = None) -> None:
+        """Let a grip hold; in a batch, of some worlds (worlds,) bool alone as far as the others can tell."""
         dynamics = dynamics_of(grip.body)
         assert dynamics is not None
         self._engine.allow_grip(grip.spec, grip.target is not None and grip.target.is_dynamic)
         grip._world = self
         self._grips_by_key[grip.key] = grip
+        dynamics.note_grips(worlds)
         dynamics.grips.append(grip)
-        dynamics.grips_changed = True
         self._engine.changed()
         if grip.ignored:
-            self._colliders_changed()
+            self._held_changed(worlds)
 
-    def _drop_grip(self, grip: Grip) -> None:
-        grip._world = None
+    def _drop_grip(self, grip: Grip, worlds: np.ndarray | None = None) -> None:
+        """Let a grip go, in all worlds or in some (worlds,) bool, where it holds nothing any more."""
         dynamics = dynamics_of(grip.body)
         self._engine.changed()
+        if worlds is not None:
+            grip.spec = released(grip.spec, worlds)
+        if worlds is None or not holding(grip.spec, self.world_count).any():
+            grip._world = None
         if dynamics is not None:
-            dynamics.grips = [other for other in dynamics.grips if other is not grip]
-            dynamics.grips_changed = True
+            dynamics.note_grips(worlds)
+            dynamics.grips = [other for other in dynamics.grips if other is not grip or grip.active]
             if grip.ignored:
-                self._colliders_changed()
+                self._held_changed(worlds)
 
     def _colliders_changed(self) -> None:
         self._collider_version += 1
         self._engine.changed()
-        grips = [grip for dynamics in self._attached() for grip in dynamics.grips]
-        self._rules.set_held((grip.body.key, key) for grip in grips for key in grip.ignored)
+        self._take_held()
         self._colliders.clear()
         self._kinematic = None
+
+    def _take_held(self) -> None:
+        grips = [grip for dynamics in self._attached() for grip in dynamics.grips]
+        self._rules.set_held(
+            (grip.body.key, key, holding(grip.spec, self.world_count)) for grip in grips for key in grip.ignored
+        )
+
+    def _held_changed(self, worlds: np.ndarray | None) -> None:
+        """Let what a held rigid body passes through be other bodies now, in all worlds or in some (worlds,) bool."""
+        if worlds is None:
+            self._colliders_changed()
+            return
+        self._take_held()
+        if self._rigid is not None:
+            self._rigid.held_changed(self, worlds)
 
     def _body_changed(self, key: str) -> None:
         """Be told that a body was moved, or its friction or groups changed."""

@@ -201,10 +201,15 @@ class Stepping:
                     sums[coupled.kept[grip.body]] = own[coupled.kept[grip.body]]
             return nothing
         dynamics: Any = grip.body._dynamics
-        known = [other for other in dynamics.grips if not other.is_tie]
+        known, changed = dynamics.point_grips(), np.zeros(worlds, dtype=bool)
         if dynamics.grips_changed:
+            if dynamics.grips_before is None:
+                return nothing
+            known, changed = dynamics.grips_before
+        if grip not in known:
             return nothing
         forces, mass = dynamics.solver.grip_forces()[known.index(grip)]
+        forces[changed], mass[changed] = 0.0, 0.0
         now, acceleration = _path_state(grip.spec, self._world.time, 1.0 / self._world.frame_rate)
         forces = forces + mass[..., None] * (np.asarray(self._world.gravity) - acceleration)
         corners = grip.spec.vertices if grip.spec.vertices is not None else grip.spec.corners[..., 0]
