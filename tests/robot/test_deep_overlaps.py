@@ -92,7 +92,7 @@ def test_what_stands_in_a_hand_throws_nothing(standing, put):
     apart, speed, last = watch(robot, 1.2)
     assert apart < APART and speed < SPEED and robot.state().fallen is None
     assert np.linalg.norm(middle(hand) - start) < 0.2  # [m]
-    if put not in (towel, sheet):  # a cloth that goes through parts of a link from both sides lets go now and then
+    if put not in (towel, sheet):  # a cloth that goes through an arm lets go now and then
         assert last < 0.3
 
 
@@ -106,22 +106,9 @@ def g1_with(put, name):
     return robot
 
 
-CAUGHT = pytest.param(
-    "left_elbow_link", towel,
-    marks=pytest.mark.xfail(reason="a cloth on both sides of the wrist lets it go at 3.5 m/s", strict=False),
-)  # fmt: skip
-"""Whether it is let go so fast within the second depends on the last bit."""
-
-
 @pytest.mark.long
-@pytest.mark.parametrize(
-    ("name", "put"),
-    [
-        *(("left_elbow_link", put) for put in (box, ball, cube, soft_cube, sheet)),
-        *(("left_wrist_yaw_link", put) for put in (box, ball, cube, soft_cube, towel, sheet)),
-        CAUGHT,
-    ],
-)
+@pytest.mark.parametrize("name", ["left_elbow_link", "left_wrist_yaw_link"])
+@pytest.mark.parametrize("put", [box, ball, cube, soft_cube, towel, sheet])
 def test_what_stands_in_an_arm_of_g1_throws_nothing(name, put):
     """The same of G1, which may make a step."""
     robot = g1_with(put, name)
@@ -132,10 +119,67 @@ def test_what_stands_in_an_arm_of_g1_throws_nothing(name, put):
 
 @pytest.mark.long
 def test_g1_whose_wrist_a_cloth_catches_stays_whole():
-    """However fast the cloth lets go of the wrist: no joint opens, G1 stands, and its arm comes to rest."""
+    """With the forearm on one side of the cloth and the wrist on the other: the arm comes to rest, pressed by little.
+
+    What presses both grew to 16 kN within a second, until the wrist was thrown.
+    """
     robot = g1_with(towel, "left_elbow_link")
-    apart, _, last = watch(robot, 2.0)
-    assert apart < APART and last < 0.5
+    apart, speed, last = watch(robot, 2.0)
+    assert apart < APART and speed < SPEED and last < 0.5
+    assert robot.state().fallen is None
+    felt = [force for links in robot.state().contacts.values() for other, force in links.items() if other == "sheet"]
+    assert felt and max(float(np.linalg.norm(force)) for force in felt) < 1000.0  # [N]
+
+
+@pytest.mark.long
+def test_a_cloth_on_both_sides_of_an_arm_throws_nothing(standing):
+    """A towel that was drawn askew through Talos' hand."""
+    world, robot = standing
+    place = middle(link_of(robot, "arm_left_7_link")) + np.array((-0.024, 0.020, 0.001))
+    body = world.add(nuno.sheet((0.3, 0.3), (14, 14), position=place, quaternion=(-0.489, 0.481, 0.408, -0.603)))
+    world.attach(body)
+    world.run(0.2)
+    world.detach(body)
+    apart, speed, _ = watch(robot, 1.5)
+    assert apart < APART and speed < SPEED
+    assert robot.state().fallen is None
+
+
+def pressed_between(world, link, depth):
+    """Put a static box on each side of a link along x, so deep [m] inside it."""
+    corners = link.vertices.min(axis=0), link.vertices.max(axis=0)
+    center = (corners[0] + corners[1]) / 2
+    for sign, corner in zip((-1.0, 1.0), corners, strict=True):
+        place = np.array((corner[0] + sign * (0.1 - depth), center[1], center[2]))
+        world.add(nuno.box((0.2,) * 3, position=place))
+
+
+def test_a_hand_between_two_boxes_stays(standing):
+    """Talos' hand is 12 mm deep in each: it left at 7 m/s. The same bits in each world of a batch, and restored."""
+    world, robot = standing
+    pressed_between(world, link_of(robot, "arm_left_7_link"), 0.012)
+    world.run(0.2)
+    saved, futures = world.save(), world.imagine(3)
+    apart, speed, last = watch(robot, 1.3)
+    assert apart < APART and speed < 0.5 and last < 0.1
+    assert robot.state().fallen is None
+    once = np.concatenate([body.vertices for body in world.bodies])
+    world.restore(saved)
+    world.run(1.3)
+    np.testing.assert_array_equal(np.concatenate([body.vertices for body in world.bodies]), once)
+    futures.run(1.3)
+    for k in range(3):
+        np.testing.assert_array_equal(np.concatenate([body.vertices[k] for body in futures.bodies]), once)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("depth", [8e-4, 2e-3, 5e-3, 1.2e-2])
+def test_a_wrist_of_g1_between_two_boxes_stays(depth):
+    """At 0.8 mm it was thrown at 40 m/s, and G1 fell; at 5 mm it left at 3.5 m/s."""
+    robot = g1_with(lambda world, place: None, "left_wrist_yaw_link")
+    pressed_between(robot.world, link_of(robot, "left_wrist_yaw_link"), depth)
+    apart, speed, _ = watch(robot, 1.5)
+    assert apart < APART and speed < SPEED
     assert robot.state().fallen is None
 
 

@@ -3,6 +3,7 @@
 import warp as wp
 
 from nuno.coupled.bounded_particles import Particles, bound_all
+from nuno.coupled.caught_links import catch_links
 from nuno.coupled.contact_rows import Rows, forget_sharers, take_sums
 from nuno.coupled.joint_constraints import begin_joint, joint_at, project_joint, projections_of, settle_spins, sum_joint
 from nuno.coupled.joint_contacts import resolve_entries, resolve_others
@@ -243,6 +244,8 @@ def solve(
                 sum_hold(rigid, holds, world, k, dt, fraction)
         for k in range(joints.count):
             sum_joint(rigid, joints, world, k, dt)
+        if joints.count > 0:
+            catch_links(rigid, passing, world)
     if at_once != 0:
         bound_all(particles, world, rank, size)
         barrier(size)

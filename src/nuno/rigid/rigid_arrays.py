@@ -28,7 +28,7 @@ BODY = dict(
     position=wp.vec3, rotation=wp.quat, position_before=wp.vec3, rotation_before=wp.quat, position_free=wp.vec3,
     rotation_free=wp.quat, lost=wp.vec3, left=wp.vec3, left_turn=wp.vec3, velocity=wp.vec3, spin=wp.vec3,
     force=wp.vec3, torque=wp.vec3, drag=float, inverse_mass=float, inertia=wp.mat33, inverse_inertia=wp.mat33,
-    weight=float, give=wp.mat33, joined=int,
+    weight=float, give=wp.mat33, pressed=wp.vec3, caught=int, joined=int,
 )  # fmt: skip
 """Arrays of `RigidState` with a row for each body of each world."""
 SAVED = ("position", "rotation", "velocity", "spin", "force", "torque")

@@ -36,6 +36,8 @@ class RigidState:
     inverse_inertia: wp.array(dtype=wp.mat33)
     weight: wp.array(dtype=float)  # the inverse mass in this run [1/kg], negative once a hold says where it is
     give: wp.array(dtype=wp.mat33)  # the inverse inertia in this run, world frame, of where the substep began
+    pressed: wp.array(dtype=wp.vec3)  # sum of the normals of what touches it and cannot go: see `note_pressed`
+    caught: wp.array(dtype=int)  # 1 where two of them, or those of two joined bodies, oppose each other
     joined: wp.array(dtype=int)  # 1 once joints say where it is in this substep, 2: see `note_parted`
 
 
@@ -178,6 +180,8 @@ def begin_body(s: RigidState, i: int, role: int):
     s.position_before[i] = s.position[i]
     s.rotation_before[i] = q
     s.joined[i] = 0
+    s.caught[i] = 0
+    s.pressed[i] = wp.vec3(0.0)
     w = s.inverse_mass[i]
     if role == 1 and w > 0.0:
         s.weight[i] = w

@@ -8,6 +8,7 @@ and what stuck goes back where it stuck, which gives nothing a velocity.
 
 import warp as wp
 
+from nuno.rigid.caught_bodies import CAUGHT, FADED, is_caught, note_pressed
 from nuno.rigid.convex import Parts
 from nuno.rigid.manifold import POINTS
 from nuno.rigid.pair_motion import (
@@ -35,7 +36,7 @@ PART_SPEED = wp.constant(0.5)
 """[m/s] What overlaps parts no faster, so that a bad start is no explosion."""
 DEEP = wp.constant(2.0e-3)
 """[m] Overlap from which on joints are closed after it was parted: see `nuno.coupled.joint_closing`. Feet that land
-come less deep, 1.4 mm at most in a walk of Talos."""
+come less deep, 1.4 mm at most in a walk of Talos. Of bodies that are caught `CAUGHT` counts."""
 
 
 @wp.func
@@ -51,14 +52,17 @@ def limited(force: wp.vec3, mu: float):
 
 @wp.func
 def start_entry(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, dt: float):
-    """Apply the last substep's forces to the velocities."""
+    """Apply the last substep's forces to the velocities, and note what presses a body and cannot go."""
     m = meeting_of(s, parts, c, world, e)
     total = wp.vec3(0.0)
     turn_a = wp.vec3(0.0)
     turn_b = wp.vec3(0.0)
+    touches = int(0)
     for k in range(c.count[e]):
         o = e * POINTS + k
         f = limited(c.force[o], c.friction[e])
+        if c.start[o][0] < 0.0 or f[0] > 0.0:
+            touches = 1
         c.force[o] = f
         push = dt * (f[0] * m.n + f[1] * m.t + f[2] * m.u)
         total = total + push
@@ -70,6 +74,8 @@ def start_entry(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, dt
     if m.wb > 0.0:
         s.velocity[m.j] = s.velocity[m.j] - m.wb * total
         s.spin[m.j] = s.spin[m.j] - m.ib * turn_b
+    if touches == 1:
+        note_pressed(s, m)
 
 
 @wp.func
@@ -264,7 +270,8 @@ def note_parted(s: RigidState, i: int, weight: float):
 def mend_entry(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, dt: float, still: float):
     """Positions alone: take back a share of what overlaps, and of what slipped though friction held it.
 
-    The force of an impact is forgotten: the next substep begins with forces that last.
+    The force of an impact is forgotten: the next substep begins with forces that last. What a caught body is deep in
+    begins it with a little less each time.
     """
     m = meeting_of(s, parts, c, world, e)
     note_impulse(parts, c, m, e, dt)
@@ -280,6 +287,8 @@ def mend_entry(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, dt:
     g = places_of(s, m)
     before = free_places_of(s, m)
     deep = int(0)
+    caught = is_caught(s, m)
+    depth = wp.where(caught, CAUGHT, DEEP)
     for h in range(c.count[e]):
         k = c.count[e] - 1 - h
         o = e * POINTS + k
@@ -297,13 +306,15 @@ def mend_entry(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, dt:
             # of all entries together: what other points have parted it by counts
             parted = wp.dot(m.n, went - against(before, ra, rb))
             back = wp.max(wp.min(-MEND * (gap + REST), PART_SPEED * dt - wp.max(parted, 0.0)), 0.0) * mass[0] * m.n
-            if gap < -DEEP:
+            if gap < -depth:
                 deep = 1
         if f[0] > 0.0 and not is_slipping(f, c.friction[e]):
             back = back - MEND * (start[1] + wp.dot(m.t, went)) * mass[1] * m.t
             back = back - MEND * (start[2] + wp.dot(m.u, went)) * mass[2] * m.u
         if start[3] < -still:
             c.force[o] = wp.vec3(0.0)
+        elif caught and gap < -CAUGHT:
+            c.force[o] = FADED * f
         if wp.length_sq(back) > 0.0:
             g.xa = g.xa + m.wa * back
             g.ta = g.ta + m.ia * wp.cross(ra, back)
