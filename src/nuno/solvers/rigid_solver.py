@@ -241,11 +241,8 @@ class RigidSolver(RigidContacts):
         self.table.set_vertices(self.part_rows[slot][0], np.asarray(vertices, dtype=float))
         self._forget_rows(self.part_rows[slot])
 
-    def finite(self, slot: int | None = None) -> np.ndarray:
-        """(worlds,) bool: whether a body, or every body, has a finite state."""
-        if slot is None:
-            motions = self.motions(list(self.part_rows))
-            return np.all([np.isfinite(part).all(axis=(1, 2)) for part in motions], axis=0)
+    def finite(self, slot: int) -> np.ndarray:
+        """(worlds,) bool: whether a body has a finite state."""
         return np.all([np.isfinite(self._read(name, slot)).all(axis=-1) for name in SAVED[:4]], axis=0)
 
     # Time

@@ -11,6 +11,7 @@ import numpy as np
 from nuno.bodies.body import Body
 from nuno.dynamics.dynamics import SOON, Dynamics, ParticleDynamics, dynamics_of
 from nuno.errors import SimulationDiverged
+from nuno.solvers.runaways import warn_of_runaways
 from nuno.tables.kinematic_motion import arrive, make_schedule
 from nuno.world.impacts import are_fast
 from nuno.world.run_start import RunStart
@@ -92,8 +93,13 @@ class Advancing(Simulation):
             elif not self._run_looking(now, stop, look, instants, moving if careful else None):
                 return False
             now = stop
-        rigid: Any = next((dynamics for dynamics in moving.values() if dynamics.is_rigid), None)
-        sound = rigid is not None and rigid.solver.finite().all()  # all of them at once
+        rigid: dict[Body, Any] = {body: dynamics for body, dynamics in moving.items() if dynamics.is_rigid}
+        sound = False
+        if rigid:  # all of them at once
+            motions = next(iter(rigid.values())).solver.motions([own.slot for own in rigid.values()])
+            sound = all(np.isfinite(part).all() for part in motions)
+            if sound and not self._quiet:
+                warn_of_runaways(list(rigid), motions[2], finish)
         broken = [
             (body, np.atleast_1d(dynamics.finite()))
             for body, dynamics in moving.items()
