@@ -47,7 +47,7 @@ nitpick_ignore_regex = [
     ("py:class", r"(.*\.)?(ArmPlan|BodyRecord|CarryPlan|FoldComparison|Futures|GripRecord|RigidLayout)"),
     ("py:class", r"(.*\.)?(HoldView|ImageSource)"),
     ("py:class", r"(.*\.)?(GripSpec|ImageReading|ImaginedRobot|Scene|Schedule|SoftTopology|States|WalkPlanner)"),
-    ("py:class", r"(.*\.)?(ContactRules|Formula|Sent|Simulation|WalkOrder)"),
+    ("py:class", r"(.*\.)?(ContactRules|Formula|GripOrder|Sent|Simulation|WalkOrder)"),
     # What a narrower type or a protocol says of a public class
     ("py:class", r"(.*\.)?(EngineWorld|LearntFold|OriginalRobot|Robot|WalkSettings)"),
 ]

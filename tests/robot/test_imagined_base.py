@@ -108,7 +108,7 @@ def test_walks_change_under_way_beside_other_commands(scene):
         assert_same(ends[k], state_of(world, robot.state()))
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_velocities_that_are_sent_again(scene):
     """As from a joystick: one that ends at the wall, one that changes, one not renewed; landings as by the driver."""
     world, robot, saved = scene
