@@ -211,6 +211,41 @@ def check(seed, dynamics):
 
 
 @pytest.mark.long
+def test_fingers_that_are_opened_let_go_in_copies_too():
+    """Promise: a vector that opens fingers with dynamics lets go in copies as alone, now and in copies of these."""
+    robot = room(True)
+    world = robot.world
+    robot.start_grasp("larm", wait=False)
+    world.run(0.35)
+    closed = robot.balance.dynamics.fingers.closed
+    futures, saved = world.imagine(2), world.save()
+    for own in (futures.robot, robot):
+        own.angle_vector({"gripper_left_joint": -0.3}, 0.2)
+    robot.world.run(0.4)
+    assert not closed["left_hand"]  # the towel was between its fingers
+    robot.angle_vector({ARM: -1.0}, 0.2)
+    world.run(0.2)
+    alone = state_of(world, robot.state())
+
+    futures.run(0.4)
+    again, kept = futures.imagine(1, world=1), futures.save()
+    for _ in range(2):  # the second time from where the batch went back to
+        futures.robot.angle_vector({ARM: -1.0}, 0.2)
+        futures.run(0.2)
+        for k, state in enumerate(futures.robot.state()):
+            assert differing(state_of(futures, state, k), alone) == []
+        futures.restore(kept)
+    again.robot.angle_vector({ARM: -1.0}, 0.2)
+    again.run(0.2)
+    assert differing(state_of(again, again.robot.state()[0], 0), alone) == []
+    world.restore(saved)
+    world.adopt(futures, 1)
+    robot.angle_vector({ARM: -1.0}, 0.2)
+    world.run(0.2)
+    assert differing(state_of(world, robot.state()), alone) == []
+
+
+@pytest.mark.long
 @pytest.mark.parametrize("seeds", [(0, 17), pytest.param(range(1, 22), marks=pytest.mark.slow)], ids=str)
 @pytest.mark.parametrize("dynamics", [False, True], ids=["kinematic", "dynamic"])
 def test_walks_in_copies_of_random_robots(dynamics, seeds):

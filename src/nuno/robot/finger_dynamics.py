@@ -61,6 +61,7 @@ class FingerDynamics:
         limits: The most that the fingers of each hand can press with [N], by its name.
         closed: Whether each hand was told to close: it presses on what stops it until it is told to open, or its joint
             is wanted clearly more open than it is; a vector of all joints' angles as they are does not loosen it.
+            Of copies (worlds,) bool, where they differ.
         forces: The most that the fingers of each hand press with now [N]; the limits at first.
     """
 
@@ -73,7 +74,7 @@ class FingerDynamics:
         limits = {finger.hand: float(efforts[finger.row] * finger.force_of_effort) for finger in self.fingers}
         self.limits = {hand: min(force, ENDLESS) for hand, force in limits.items()}
         self.forces = dict(self.limits)
-        self.closed = dict.fromkeys(self.limits, False)
+        self.closed: dict[str, Any] = dict.fromkeys(self.limits, False)
         self._turning: dict[int, np.ndarray] = {}  # by joint, what each finger is given of the inertia it carries
 
     def left(self, joint: int, inertia: Any) -> Any:
@@ -139,13 +140,18 @@ class FingerDynamics:
         for k, finger in enumerate(self.fingers):
             goal = finger.slide(wanted)
             presses = goal >= finger.far
-            if self.closed[finger.hand]:
-                presses |= goal > slides[:, k] - OPENS
+            if np.any(self.closed[finger.hand]):
+                presses = presses | (self.closed[finger.hand] & (goal > slides[:, k] - OPENS))
             goals[:, k] = np.where(presses, finger.far + AHEAD, goal)
         stiffness, still = forces / AHEAD, np.zeros(len(forces))
         goals = np.clip(goals, slides - AHEAD, slides + AHEAD)
         set_motors(self.joints, goals, still, stiffness, DAMPED * stiffness, forces, still)
         return {finger.row: finger.angle(slides[:, k]) for k, finger in enumerate(self.fingers)}
+
+    def become(self, copies: FingerDynamics, world: int) -> None:
+        """Press as the copies in one world of a batch do."""
+        self.forces = dict(copies.forces)
+        self.closed = {hand: bool(np.ravel(own)[world if np.ndim(own) else 0]) for hand, own in copies.closed.items()}
 
     def imagined(self, world: World, bodies: Sequence[Body], joints: Mapping[str, Any]) -> FingerDynamics:
         """Return the same for copies in a batch.

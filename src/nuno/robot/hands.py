@@ -94,8 +94,12 @@ class Hand:
         own = self.description
         if own.joint is None:
             return own.width
-        angle = self._joint_angles()[self.links.robot.joint_index(own.joint)]
-        return float(own.width * np.clip((angle - own.closed) / (own.open - own.closed), 0.0, 1.0))
+        return float(self.width_at(self._joint_angles()[self.links.robot.joint_index(own.joint)]))
+
+    def width_at(self, angle: np.ndarray) -> np.ndarray:
+        """Return how far apart the fingers are [m] where the hand's joint is at an angle, or at several."""
+        own = self.description
+        return np.asarray(own.width * np.clip((angle - own.closed) / (own.open - own.closed), 0.0, 1.0))
 
     @checked
     def joint_angles(self, width: float) -> dict[str, float]:
@@ -309,6 +313,17 @@ def pressed_by(hand: Hand, contacts: Contacts) -> tuple[Body, ...]:
     """
     if not hand.presses:
         return ()
+    names = pressed_names(hand, contacts, hand.links.bodies)
+    return tuple(body for body in hand.links.world.bodies if body.name in names)
+
+
+def pressed_names(hand: Hand, contacts: Contacts, links: Sequence[Body]) -> set[str]:
+    """Return the names of what all fingers of a hand that presses touch.
+
+    Args:
+        hand: The hand.
+        contacts: What touched the robot's links in the frame, or those of its copy.
+        links: The robot's, or the copy's, which are left out.
+    """
     names = set.intersection(*({name for link in own for name in contacts.get(link, ())} for own in hand._fingers))
-    bodies = hand.links.world.bodies
-    return tuple(body for body in bodies if body.name in names and body not in hand.links.bodies)
+    return names - {body.name for body in links}

@@ -20,6 +20,7 @@ from nuno.robot.imagined_sensors import ImaginedReadings, ImaginedSensors
 from nuno.robot.link_batch import LinkBatch
 from nuno.robot.motion_batch import MotionBatch
 from nuno.robot.motion_guard import MotionGuard
+from nuno.robot.pressing_hands import PressingHands
 from nuno.robot.robot_state import RobotState, RobotStates
 from nuno.robot.simulated_joints import Sent
 from nuno.robot.trajectory import JointTrajectory, passing_velocities
@@ -136,6 +137,11 @@ class ImaginedRobot(ImaginedBase, ImaginedHands):
                 "%s of %r closes: its copies' fingers go on, but grip nothing there; imagine when it holds",
                 " and ".join(closing), original.actual.name,
             )  # fmt: skip
+        self._pressing: PressingHands | None = None
+        if self.balance is not None:
+            source = None if of is None or of[0]._pressing is None else (of[0]._pressing, of[1])
+            fingers = self.balance.dynamics.fingers
+            self._pressing = PressingHands(original.grippers, fingers, self._links, goals, source)
         self._before = self._states
         self._ground = original.sensors.ground
         self._read: ImaginedReadings | None = None
@@ -334,6 +340,9 @@ class ImaginedRobot(ImaginedBase, ImaginedHands):
         ended = self.balance.ended(max(self.world.time - self._before[0].time, 1e-9))
         self._states = self.balance.judge(self._states, self._together.aims, ended, self.world.time)
         self._together.end(self._states)
+        if self._pressing is not None:
+            angles = np.array([self.original.actual.angles_of(state.q) for state in self._states])
+            self._pressing.end_frame(self._states, angles, self._together.wanted)
 
     def cancel_frame(self) -> None:
         """Go back to where the robot was when the frame began."""
@@ -366,6 +375,10 @@ class ImaginedRobot(ImaginedBase, ImaginedHands):
         if not self._is_whole():
             return None
         return ImaginedRobot(self.original, futures, (self, world))
+
+    def finger_motions(self, world: int) -> dict[str, Goal | None]:
+        """Return by hand with dynamics what moves the fingers of one world's, of what the hands were told."""
+        return {} if self._pressing is None else self._pressing.motions_of(world)
 
     def _is_whole(self) -> bool:
         """Return True as long as no link was removed from the batch; without all of them the robot does nothing."""

@@ -333,8 +333,8 @@ class LinkDynamics:
         made.fingers = self.fingers.imagined(world, made.bodies, keys)
         return made
 
-    def take(self, copies: LinkDynamics | None) -> None:
-        """Have the joints of copies, whose world its own has become one of; None for copies without dynamics.
+    def take(self, copies: LinkDynamics | None, world: int) -> None:
+        """Have the joints of copies, whose ``world`` its own has become; None for copies without dynamics.
 
         They are others where the links were detached and attached since.
         """
@@ -343,6 +343,7 @@ class LinkDynamics:
             keys: dict[str, Any] = {grip.key: grip for grip in _grips_of(self.bodies)}
             self.joints = tuple(keys[joint.key] for joint in copies.joints)
             self.fingers.joints = tuple(keys[joint.key] for joint in copies.fingers.joints)
+            self.fingers.become(copies.fingers, world)
 
     def save(self) -> tuple[Any, ...]:
         """Return its joints and how hard its fingers press, for ``load``."""

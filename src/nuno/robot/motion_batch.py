@@ -202,6 +202,13 @@ class MotionBatch:
                 self._aims[w] = self._motions[w].aim  # a step that ends puts it elsewhere
         self._drop_step()
 
+    @property
+    def wanted(self) -> np.ndarray:
+        """Places (n, m) where the joints are wanted."""
+        if self._joints is not None:
+            return np.asarray(self._joints.desired[0])
+        return np.array([own.joints.desired[0] for own in self._motions])
+
     def _actual(self, state: RobotState) -> Motion:
         """Return where the joints are in a state, and how they move, (m,) each."""
         return self._robot.angles_of(state.q), state.v[6:], state.a[6:]

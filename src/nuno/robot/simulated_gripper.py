@@ -198,6 +198,15 @@ class SimulatedGripper:
         known = tuple(grips[grip.key] for grip in before[0] if grip.key in grips)
         self.load((own_goal, status, (moves, *motion[1:7], (known, before[1])), here, pressed))
 
+    @property
+    def motion(self) -> Goal | None:
+        """The goal of the joints that moves the fingers, or did last; None where none did."""
+        return self._motion
+
+    def go_with(self, motion: Goal | None, goals: Mapping[int, Goal]) -> None:
+        """Have a goal of a copy's joints, or what stands for it here by ``id``, move the fingers."""
+        self._motion = motion if motion is None else goals.get(id(motion)) or motion.copy()
+
     def _let_go_where_opened(self) -> None:
         """Let go of what is held where a vector of joint angles, and no gripper's goal, opens the fingers."""
         hand, fingers = self.hand, self._fingers
@@ -230,9 +239,7 @@ class SimulatedGripper:
 
     def _wanted_width(self, joint: str) -> float:
         """Return how far apart the fingers are wanted [m]."""
-        own = self.hand.description
-        angle = self._joints.desired[0][self.hand.links.robot.joint_index(joint)]
-        return float(own.width * np.clip((angle - own.closed) / (own.open - own.closed), 0.0, 1.0))
+        return float(self.hand.width_at(self._joints.desired[0][self.hand.links.robot.joint_index(joint)]))
 
     def _is_moving(self) -> bool:
         """Return True as long as the fingers move, up to a while."""

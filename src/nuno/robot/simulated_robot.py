@@ -353,7 +353,7 @@ class SimulatedRobot(SimulatedBase):
             if getattr(other, "original", None) is self:
                 if self.balance is not None:
                     copies = other.balance  # type: ignore[attr-defined]
-                    self.balance.dynamics.take(None if copies is None else copies.dynamics)
+                    self.balance.dynamics.take(None if copies is None else copies.dynamics, k)
                 joints = () if self.balance is None else self.balance.dynamics.save()
                 state, motion, servo, guard = other.saved_of(k)  # type: ignore[attr-defined]
                 hands = self.save()[3]
@@ -365,6 +365,8 @@ class SimulatedRobot(SimulatedBase):
                     for name, gripper in self.grippers.items():
                         gripper.take_over(copied[0][name], goals, grips_by_key(self.world))
                     self._grip_queue.waiting = copied[1]
+                for name, motion in other.finger_motions(k).items():  # type: ignore[attr-defined]
+                    self.grippers[name].go_with(motion, goals)
 
     def future_commands(self, futures: World, k: int) -> Callable[[], None]:
         """Return what lets the robot do from now on what its copy in one world of a batch was told to."""
