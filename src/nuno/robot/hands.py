@@ -94,12 +94,7 @@ class Hand:
         own = self.description
         if own.joint is None:
             return own.width
-        return float(self.width_at(self._joint_angles()[self.links.robot.joint_index(own.joint)]))
-
-    def width_at(self, angle: np.ndarray) -> np.ndarray:
-        """Return how far apart the fingers are [m] where the hand's joint is at an angle, or at several."""
-        own = self.description
-        return np.asarray(own.width * np.clip((angle - own.closed) / (own.open - own.closed), 0.0, 1.0))
+        return float(width_at(own, self._joint_angles()[self.links.robot.joint_index(own.joint)]))
 
     @checked
     def joint_angles(self, width: float) -> dict[str, float]:
@@ -302,6 +297,11 @@ def carried_by(links: Links, body: Body) -> list[Body]:
 def hands_of(links: Links) -> dict[str, Hand]:
     """Return the hands of a robot that is in a world, by name."""
     return {name: Hand(links, name) for name in links.robot.description.hands}
+
+
+def width_at(own: HandOnFrame, angle: np.ndarray) -> np.ndarray:
+    """Return how far apart a hand's fingers are [m] where its joint is at an angle, or at several."""
+    return np.asarray(own.width * np.clip((angle - own.closed) / (own.open - own.closed), 0.0, 1.0))
 
 
 def pressed_by(hand: Hand, contacts: Contacts) -> tuple[Body, ...]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nuno.robot.hands import pressed_names
+from nuno.robot.hands import pressed_names, width_at
 from nuno.robot.simulated_gripper import LOOSE
 
 if TYPE_CHECKING:
@@ -58,11 +58,11 @@ class PressingHands:
             wanted: (worlds, n), and where they are wanted.
         """
         for name, hand in self._hands.items():
-            joint = hand.description.joint
-            if joint is None:
+            own = hand.description
+            if own.joint is None:
                 continue
-            row = hand.links.robot.joint_index(joint)
-            loose = hand.width_at(wanted[:, row]) > hand.width_at(angles[:, row]) + LOOSE
+            row = hand.links.robot.joint_index(own.joint)
+            loose = width_at(own, wanted[:, row]) > width_at(own, angles[:, row]) + LOOSE
             opens = np.asarray(self._fingers.closed[name] & loose)
             for world in np.flatnonzero(opens).tolist():
                 motion = self._motions[name][world]

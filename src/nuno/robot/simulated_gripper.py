@@ -9,7 +9,7 @@ import numpy as np
 
 from nuno.robot.finger_dynamics import OPENS
 from nuno.robot.goal import Goal, GoalStatus, ResultCode
-from nuno.robot.hands import Hand, pressed_by
+from nuno.robot.hands import Hand, pressed_by, width_at
 from nuno.robot.simulated_joints import SimulatedJoints
 from nuno.robot.trajectory import JointTrajectory
 
@@ -239,7 +239,7 @@ class SimulatedGripper:
 
     def _wanted_width(self, joint: str) -> float:
         """Return how far apart the fingers are wanted [m]."""
-        return float(self.hand.width_at(self._joints.desired[0][self.hand.links.robot.joint_index(joint)]))
+        return float(width_at(self.hand.description, self._joints.desired[0][self.hand.links.robot.joint_index(joint)]))
 
     def _is_moving(self) -> bool:
         """Return True as long as the fingers move, up to a while."""
