@@ -19,23 +19,23 @@ if TYPE_CHECKING:
 
 def holding(spec: Any, worlds: int) -> np.ndarray:
     """Return (worlds,) bool, where a grip, tie or hold of these numbers holds anything; joints do everywhere."""
-    if isinstance(spec, HoldSpec | JointSpec):
-        held: Any = getattr(spec, "held", None)
-        held = True if held is None else held
-    else:
-        own = getattr(spec, "vertices", None)
-        held = (corners_of(spec)[0][..., 0] if own is None else own).max(axis=1, initial=-1) >= 0
-    return np.array(np.broadcast_to(held, (worlds,)))
+    return np.array(np.broadcast_to(_held(spec), (worlds,)))
 
 
 def holds_in(spec: Any, index: int) -> bool:
     """Return True if a grip, tie or hold of these numbers holds anything in one world of a batch."""
+    held = _held(spec)
+    return bool(held[index if len(held) > 1 else 0])
+
+
+def _held(spec: Any) -> np.ndarray:
+    """Return where they hold anything, (worlds,) bool, or (1,) for all worlds."""
     if isinstance(spec, HoldSpec | JointSpec):
         held = getattr(spec, "held", None)
-        return held is None or bool(held[index])
+        return np.ones(1, dtype=bool) if held is None else held
     own = getattr(spec, "vertices", None)
     rows = corners_of(spec)[0][..., 0] if own is None else own
-    return bool(rows[index if len(rows) > 1 else 0].max(initial=-1) >= 0)
+    return np.asarray(rows.max(axis=1, initial=-1) >= 0)
 
 
 def released(spec: Any, worlds: np.ndarray) -> Any:

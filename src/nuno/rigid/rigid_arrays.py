@@ -158,11 +158,11 @@ class RigidArrays:
         c.notes = wp.full(worlds * NOTES, -1.0, dtype=float, device=self.device)
         c.parts, c.row = parts, row
 
-    def _lengthen_rows(self) -> None:
+    def make_room(self) -> None:
         """Make room for twice as many near each part.
 
         Worlds in which there was enough keep what they have found in the substep, and when they list pairs anew, as
-        they would alone.
+        they would alone; those in which a row was too short have still to go on.
         """
         c, worlds = self.manifolds, self.world_count
         log.info("a part has more than %d others near by: making room for twice as many", c.row)

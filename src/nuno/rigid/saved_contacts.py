@@ -35,7 +35,7 @@ def load_contacts(arrays: RigidArrays, slot: int, state: Mapping[str, np.ndarray
     """Write back what `save_contacts` gave, also of one world for all; contacts with bodies that are gone are none."""
     width = state["contact_count"].shape[2]
     while width > arrays.manifolds.row:
-        arrays._lengthen_rows()
+        arrays.make_room()
     partner = np.full(state["partner_slot"].shape, -1, dtype=np.int32)
     for other, theirs in arrays.part_rows.items():
         for k, row in enumerate(theirs):

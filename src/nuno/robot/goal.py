@@ -120,3 +120,8 @@ class Tolerances:
                      for name, value in getattr(self, what).items()}  # fmt: skip
             object.__setattr__(self, what, given)
         object.__setattr__(self, "goal_time", number("goal_time", self.goal_time, low=0.0))
+
+
+def standing_for(goal: Goal | None, goals: Mapping[int, Goal]) -> Goal | None:
+    """Return what stands for a goal in another world: by its ``id`` one of these, else a copy of it."""
+    return goal if goal is None else goals.get(id(goal)) or goal.copy()

@@ -13,6 +13,7 @@ from nuno.errors import BodyStateError, InvalidInputError, UnknownNameError
 from nuno.robot.goal import Goal
 from nuno.robot.grip_order import GripOrder, GripQueue
 from nuno.robot.hand_copies import HandCopies
+from nuno.robot.hands import width_at
 from nuno.robot.interface import ARMS
 from nuno.robot.simulated_gripper import SimulatedGripper
 from nuno.validation import checked, finite_array, number
@@ -193,15 +194,9 @@ class ImaginedHands:
                 joint = grippers[0].hand.description.joint
                 assert joint is not None
                 angles = self._together.angles_ahead(count)[:, :, self.original.actual.joint_index(joint)]
-                found = self._widths(grippers[0], angles)
-                opens = (found > widths).any(axis=1)
+                opens = (width_at(grippers[0].hand.description, angles) > widths).any(axis=1)
                 count = int(opens.argmax()) + 1 if opens.any() else count
         return count
-
-    @staticmethod
-    def _widths(gripper: SimulatedGripper, angles: np.ndarray) -> np.ndarray:
-        own = gripper.hand.description
-        return np.asarray(own.width * np.clip((angles - own.closed) / (own.open - own.closed), 0.0, 1.0))
 
     def _take_up_grips(self) -> None:
         """Carry out what hands were to do by now of what was told for later."""

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from nuno.robot.goal import Goal, standing_for
 from nuno.robot.hands import pressed_names, width_at
 from nuno.robot.simulated_gripper import LOOSE
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
     from nuno.robot.finger_dynamics import FingerDynamics
-    from nuno.robot.goal import Goal
     from nuno.robot.robot_state import RobotState
     from nuno.robot.simulated_gripper import SimulatedGripper
 
@@ -41,7 +41,7 @@ class PressingHands:
         self._motions: dict[str, list[Goal | None]] = {}  # of a hand's own goal, by world
         for name in self._hands:
             before = grippers[name].motion if of is None else of[0]._motions[name][of[1]]
-            self._motions[name] = [None if before is None else own.get(id(before)) or before.copy() for own in goals]
+            self._motions[name] = [standing_for(before, own) for own in goals]
         if of is not None:
             fingers.become(of[0]._fingers, of[1])
 

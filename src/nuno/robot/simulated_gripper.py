@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.robot.finger_dynamics import OPENS
-from nuno.robot.goal import Goal, GoalStatus, ResultCode
+from nuno.robot.goal import Goal, GoalStatus, ResultCode, standing_for
 from nuno.robot.hands import Hand, pressed_by, width_at
 from nuno.robot.simulated_joints import SimulatedJoints
 from nuno.robot.trajectory import JointTrajectory
@@ -192,11 +192,11 @@ class SimulatedGripper:
         if self.goal is not None:
             self.goal.finish(GoalStatus.PREEMPTED, text="a future was adopted")
         own_goal = None if goal is None else goal.copy()
-        moves = motion[0] if motion[0] is None else goals.get(id(motion[0])) or motion[0].copy()
         here = tuple(grips[grip.key] for grip in held if grip.key in grips)
-        before = motion[7][0], motion[7][1]
-        known = tuple(grips[grip.key] for grip in before[0] if grip.key in grips)
-        self.load((own_goal, status, (moves, *motion[1:7], (known, before[1])), here, pressed))
+        before, width = motion[7]
+        known = tuple(grips[grip.key] for grip in before if grip.key in grips)
+        own_motion = standing_for(motion[0], goals), *motion[1:7], (known, width)
+        self.load((own_goal, status, own_motion, here, pressed))
 
     @property
     def motion(self) -> Goal | None:
@@ -205,7 +205,7 @@ class SimulatedGripper:
 
     def go_with(self, motion: Goal | None, goals: Mapping[int, Goal]) -> None:
         """Have a goal of a copy's joints, or what stands for it here by ``id``, move the fingers."""
-        self._motion = motion if motion is None else goals.get(id(motion)) or motion.copy()
+        self._motion = standing_for(motion, goals)
 
     def _let_go_where_opened(self) -> None:
         """Let go of what is held where a vector of joint angles, and no gripper's goal, opens the fingers."""

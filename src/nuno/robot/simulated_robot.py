@@ -308,10 +308,12 @@ class SimulatedRobot(SimulatedBase):
 
     def save(self) -> Any:
         """Return all that it is, for a snapshot."""
-        grippers = {name: gripper.save() for name, gripper in self.grippers.items()}
         joints = () if self.balance is None else self.balance.dynamics.save()
-        hands, guard = (grippers, self._grip_queue.waiting), self.guard.save()
+        hands, guard = self._save_hands(), self.guard.save()
         return self._state, self._motion.save(), joints, hands, self._servo, guard, self._burden.save()
+
+    def _save_hands(self) -> Any:
+        return {name: gripper.save() for name, gripper in self.grippers.items()}, self._grip_queue.waiting
 
     def load(self, saved: Any) -> None:
         """Become what it was when a snapshot was taken; goals that came since are given up."""
@@ -356,14 +358,14 @@ class SimulatedRobot(SimulatedBase):
                     self.balance.dynamics.take(None if copies is None else copies.dynamics, k)
                 joints = () if self.balance is None else self.balance.dynamics.save()
                 state, motion, servo, guard = other.saved_of(k)  # type: ignore[attr-defined]
-                hands = self.save()[3]
-                self.load((state, motion, joints, hands, servo, guard, self._burden.save()))
+                self.load((state, motion, joints, self._save_hands(), servo, guard, self._burden.save()))
                 goals = self._motion.disown()
                 self._base_goal = self.gait.goal
                 drop_empty_grips(self.world, self.links.bodies)
                 if (copied := other.grippers_of(k)) is not None:  # type: ignore[attr-defined]
+                    grips = grips_by_key(self.world)
                     for name, gripper in self.grippers.items():
-                        gripper.take_over(copied[0][name], goals, grips_by_key(self.world))
+                        gripper.take_over(copied[0][name], goals, grips)
                     self._grip_queue.waiting = copied[1]
                 for name, motion in other.finger_motions(k).items():  # type: ignore[attr-defined]
                     self.grippers[name].go_with(motion, goals)

@@ -323,10 +323,6 @@ class RigidSolver(RigidContacts):
         counts: np.ndarray = self.manifolds.counts.numpy().reshape(-1, COUNTS)
         return counts
 
-    def make_room(self) -> None:
-        """Make longer rows; worlds in which one was too short have still to go on."""
-        self._lengthen_rows()
-
     def _blocks_of_group(self) -> int:
         """Blocks of a block group that takes a world, one to 32 parts; 1 where a block by itself is quicker."""
         parts, cores = int(self.table.parts.count), cores_of(self.device)
