@@ -82,7 +82,8 @@ def close_joints(
         if take_parted(rigid, joints, passing, world) != 0:
             for k in range(joints.count):
                 loosen_joint(joints, limp, world, k)
-            for k_pass in range(CLOSING_PASSES):
+            passes = int(CLOSING_PASSES)  # of a constant each pass would be compiled by itself
+            for k_pass in range(passes):
                 project_trees(rigid, limp, trees, passing, world, dt, k_pass)
                 for at in range(projections_of(trees.lone)):
                     k = trees.alone[joint_at(trees.lone, at)]
