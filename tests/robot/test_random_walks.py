@@ -171,9 +171,6 @@ def check(seed, dynamics):
         except nuno.NunoError as error:
             log[-1] += f" ({type(error).__name__})"
     robot.world.run(random.choice([0.05, 1.0, 4.0]))
-    if dynamics:  # where hands that close grip nothing in copies: they have closed or opened before
-        closing = [own for own in robot.grippers.values() if own.will_hold]
-        robot.wait_until(lambda: not any(own.will_hold for own in closing), timeout=2.0)
     kinds = (None, 1.0) if dynamics else (None, 1.0, JOYSTICK)
     saved, sec = world.save(), kinds[random.integers(len(kinds))]
     ways = random.uniform(-0.2, 0.2, (3, 3)) * (1.0 if sec is None else 0.15)  # strides are as long as they are
