@@ -179,7 +179,7 @@ class SimulatedGripper:
         goal = saved[0]
         if self.goal is not None and self.goal is not goal and not self.goal.is_done:
             self.goal.finish(GoalStatus.PREEMPTED, text="another goal took its place")
-            self._command_fingers(self.closed and bool(self.hand.held))  # fingers that met nothing yet stay where they are
+            self._command_fingers(self.closed and bool(self.hand.held))  # what met nothing yet stays where it is
         if goes_on and self.goal is not goal:
             self.load(saved)
         elif not goes_on and self.was_busy(saved):
