@@ -171,6 +171,36 @@ def test_what_is_held_is_saved_imagined_and_adopted(scene):
 
 
 @pytest.mark.long
+def test_copies_of_a_copy_go_on_whatever_the_robot_has_become(scene):
+    """Copies with dynamics of one whose robot was detached since, and the other way round, hands and all: as that one.
+
+    The robot that adopts one is of its kind again.
+    """
+    world, robot, futures = begin(scene)
+    close(futures)
+    robot.detach()
+    kinematic = world.imagine(1)
+    again = futures.imagine(1, world=0)
+    robot.attach()
+    others = kinematic.imagine(1)
+    kinematic.robot.start_grasp("rarm")
+    others.robot.start_grasp("rarm")
+    for own in (kinematic, others):
+        own.run(0.3)
+    for own in (futures, again, kinematic, others):
+        own.robot.angle_vector({"lift": 0.05}, 0.2)
+        own.run(0.4)
+    ends = states_of(futures)
+    assert_same(states_of(again)[0], ends[0])
+    assert_same(states_of(others)[0], states_of(kinematic)[0])
+    world.adopt(kinematic, 0)
+    assert not robot.is_dynamic and robot.grippers[HAND].goal.holds
+    world.adopt(again, 0)
+    assert robot.is_dynamic
+    assert_same(alone(world, robot) | {"wrist": ends[0]["wrist"]}, ends[0])
+
+
+@pytest.mark.long
 def test_commands_of_a_future_include_its_hands(scene):
     """Closed after a while and lifted: the robot does so, from a snapshot and imagined, too; a goal since then ends."""
     world, robot, saved = scene

@@ -224,9 +224,9 @@ class ImaginedHands:
             angles: (worlds, n), where joints without dynamics are then.
         """
         self._ended, wanted = angles, self._together.wanted
-        for name in self.hands:
-            grippers = self._grippers[name]
-            busy = [w for w, own in enumerate(grippers) if own.hand.presses or self._has_to_do(own)]
+        for name, hand in self.hands.items():
+            grippers, presses = self._grippers[name], hand.copies[0].presses
+            busy = [w for w, own in enumerate(grippers) if presses or self._has_to_do(own)]
             for w in busy:
                 grippers[w].end_frame(self._states[w].contacts, wanted[w])
             if busy:

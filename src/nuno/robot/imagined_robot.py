@@ -106,9 +106,8 @@ class ImaginedRobot(ImaginedBase, ImaginedHands):
         self._warned_of_legs = False
         self._base_goals: list[Goal | None] = [None] * world.world_count  # of walks that were refused
         self._links = [world.find(body.name) for body in original.links.bodies]
-        self.balance: Balance | None = None
-        if original.balance is not None and (original.is_dynamic if of is None else of[0].balance is not None):
-            self.balance = original.balance.imagined(world)
+        balance = (original.balance if original.is_dynamic else None) if of is None else of[0].balance
+        self.balance: Balance | None = None if balance is None else balance.imagined(world)
         self._states: list[RobotState] = [state] * world.world_count
         groups = {name: own.names for name, own in original.joints.controllers.items()}
         self._motions, goals = [], []
