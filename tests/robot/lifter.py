@@ -45,10 +45,10 @@ fingers = [["a"], ["b"]]
 """
 
 
-def lifter_in(folder, world, **options):
-    """Return the robot in a world, its hand open between z = 0.98 and 1.02 m."""
+def lifter_in(folder, world, fingers=True, **options):
+    """Return the robot in a world, its hand open between z = 0.98 and 1.02 m; without fingers it grips."""
     (folder / "lifter.urdf").write_text(URDF)
-    (folder / "robots.toml").write_text(TABLE)
+    (folder / "robots.toml").write_text(TABLE if fingers else TABLE[: TABLE.index("fingers")])
     robot = nuno.Humanoid("lifter", robots=folder / "robots.toml")
     robot.translate((0.0, 0.0, 1.0))
     return nuno.SimulatedRobot(robot, world, **options)

@@ -136,15 +136,6 @@ def test_a_batch_goes_back_with_its_robots(scene):
     assert all(np.array_equal(once[1], state.q) for state in again.robot.state())
 
 
-@pytest.mark.parametrize("dynamics", [False, pytest.param(True, marks=pytest.mark.long)], ids=["kinematic", "dynamic"])
-def test_a_hand_that_closes_is_told(caplog, dynamics):
-    """With dynamics a hand without fingers that press grips nothing in copies when it has closed; without, it does."""
-    robot = nuno.SimulatedRobot(nuno.Humanoid("g1"), nuno.World(device="cpu"), dynamics=dynamics)
-    robot.start_grasp("larm", wait=False)
-    robot.world.imagine(1)
-    assert ("left_hand of 'g1' closes" in caplog.text) == dynamics
-
-
 def test_bad_commands_are_named(scene):
     """Another number of joints or worlds, and a world without a robot."""
     world, _, _, saved = scene

@@ -32,6 +32,11 @@ def open_hand(robot, random):
     robot.move_gripper("rarm", random.uniform(0.5, 1.0), wait=False)
 
 
+def opened(robot, random):
+    """Open or close the hand by a vector of joints."""
+    robot.angle_vector({"turn": random.uniform(-0.5, 0.0)}, 0.1)
+
+
 def stop(robot, random):
     """Stop the joints."""
     robot.cancel_angle_vector()
@@ -70,9 +75,8 @@ def adopt(robot, random):
     """Become one of two futures, whose palms go to different places, and whose hands may close or open there."""
     futures = robot.world.imagine(2)
     futures.robot.angle_vector({"lift": random.uniform(0.0, 0.1, 2)}, 0.2)
-    if futures.robot.hands:
-        futures.robot.move_gripper("rarm", random.integers(0, 2, 2))
-        futures.run(random.choice([0.0, 0.35]))
+    futures.robot.move_gripper("rarm", random.integers(0, 2, 2), effort=random.uniform(2.0, 40.0))
+    futures.run(random.choice([0.0, 0.35]))
     futures.run(0.05)
     robot.world.adopt(futures, int(random.integers(2)))
 
@@ -87,15 +91,15 @@ def adopt_commands(robot, random):
     robot.world.adopt(futures, int(random.integers(2)), only="commands")
 
 
-CHOICES = (lift, sequence, close, close, open_hand, stop, push, put, change, run, run, go_back, adopt)
-GRASPS = (*CHOICES, adopt_commands)
-"""Of a robot that begins without dynamics, whose hand is commanded in futures."""
+CHOICES = (
+    lift, sequence, close, close, open_hand, stop, push, put, change, run, run, go_back, adopt, adopt_commands, opened
+)  # fmt: skip
 
 
-def room(folder, dynamics):
+def room(folder, kind):
     """A lifter with a cube between its fingers and a towel beside it."""
     world = nuno.World(device="cpu", substeps=8)
-    robot = lifter_in(folder, world, dynamics=dynamics)
+    robot = lifter_in(folder, world, dynamics=kind != "kinematic", fingers=kind != "gripping")
     cube = world.add(nuno.box((0.05,) * 3, name="cube", position=(0.0, 0.0, 1.0)))
     world.attach(cube, nuno.Rigid(mass=0.1, friction=0.5))
     towel = world.add(nuno.sheet((0.1, 0.1), (4, 4), name="towel", position=(0.2, 0.0, 1.0)))
@@ -103,12 +107,21 @@ def room(folder, dynamics):
     return robot
 
 
-def state_of(world, state, k=None):
+def state_of(world, robot, k=None):
     """All that there is to see of a world and its robot, or of world k of a batch."""
-    found = {"q": state.q, "v": state.v, "a": state.a}
+    state, hand = robot.state() if k is None else robot.state()[k], robot.hands["right_hand"]
+    gripper = robot.grippers["right_hand"] if k is None else robot._grippers["right_hand"][k]
+    held = {body.name for body in hand.held} if k is None else {name for name, own in hand.held.items() if own[k]}
+    status = None if gripper.goal is None else (gripper.goal.status, gripper.goal.holds)
+    found = {"q": state.q, "v": state.v, "a": state.a, "held": sorted(held), "goal": str(status)}
     for body in world.bodies:
         found[body.name] = body.vertices if k is None else body.vertices[k]
     return found
+
+
+def states_of(futures):
+    """The same of each world of a batch."""
+    return [state_of(futures, futures.robot, k) for k in range(futures.world_count)]
 
 
 def differing(found, expected):
@@ -116,14 +129,13 @@ def differing(found, expected):
     return [name for name, own in expected.items() if not np.array_equal(found[name], own)]
 
 
-def check(seed, folder, dynamics):
+def check(seed, folder, kind):
     """Let random operations happen, then compare copies of every kind; return what differs, by name."""
     random = np.random.default_rng(seed)
-    robot = room(folder, dynamics)
+    robot = room(folder, kind)
     world, log = robot.world, []
     for _ in range(OPERATIONS):
-        choices = CHOICES if dynamics else GRASPS
-        operation = choices[random.integers(len(choices))]
+        operation = CHOICES[random.integers(len(CHOICES))]
         log.append(operation.__name__)
         try:
             operation(robot, random)
@@ -132,61 +144,52 @@ def check(seed, folder, dynamics):
     saved, futures = world.save(), world.imagine(3)
     world.run(AHEAD)
     futures.run(AHEAD)
-    later, wrong = state_of(world, robot.state()), []
-    for k, state in enumerate(futures.robot.state()):
-        wrong += [f"imagined {k}: {name}" for name in differing(state_of(futures, state, k), later)]
+    later, wrong = state_of(world, robot), []
+    for k, own in enumerate(states_of(futures)):
+        wrong += [f"imagined {k}: {name}" for name in differing(own, later)]
     world.restore(saved)
     world.run(AHEAD)
-    wrong += [f"restored: {name}" for name in differing(state_of(world, robot.state()), later)]
+    wrong += [f"restored: {name}" for name in differing(state_of(world, robot), later)]
 
     # commands by world: each as its own driver carries it out; one is adopted
     world.restore(saved)
     futures = world.imagine(2)
-    heights, grasps = random.uniform(0.0, 0.1, 2), random.integers(0, 2, 2)
+    heights, grasps, effort = random.uniform(0.0, 0.1, 2), random.integers(0, 2, 2), random.uniform(2.0, 40.0)
     futures.robot.angle_vector({"lift": heights}, 0.2)
     futures.run(AHEAD)
-    if futures.robot.hands:
-        futures.robot.move_gripper("rarm", grasps)
+    futures.robot.move_gripper("rarm", grasps, effort)
     futures.run(AHEAD)
-    ends = [state_of(futures, state, k) for k, state in enumerate(futures.robot.state())]
+    ends = states_of(futures)
     world.adopt(futures, 1)
-    wrong += [f"adopted: {name}" for name in differing(state_of(world, robot.state()), ends[1])]
+    wrong += [f"adopted: {name}" for name in differing(state_of(world, robot), ends[1])]
     world.run(0.05)
     futures.run(0.05)
-    ends[1] = state_of(futures, futures.robot.state()[1], 1)
-    wrong += [f"adopted, later: {name}" for name in differing(state_of(world, robot.state()), ends[1])]
+    ends[1] = states_of(futures)[1]
+    wrong += [f"adopted, later: {name}" for name in differing(state_of(world, robot), ends[1])]
 
     # the same as by its driver: what it is told, and what it grips
     world.restore(saved)
     robot.angle_vector({"lift": heights[0]}, 0.2)
     world.run(AHEAD)
-    if not robot.is_dynamic:
-        robot.move_gripper("rarm", float(grasps[0]), wait=False)
+    robot.move_gripper("rarm", float(grasps[0]), effort, wait=False)
     world.run(AHEAD)
-    wrong += [f"driven: {name}" for name in differing(state_of(world, robot.state()), ends[0])]
+    wrong += [f"driven: {name}" for name in differing(state_of(world, robot), ends[0])]
 
     # commands alone: the robot does from the same moment what its copy did
     world.restore(saved)
     world.adopt(futures, 0, only="commands")
     world.run(AHEAD)
     world.run(AHEAD)  # in the same steps, as sums of times are rounded
-    wrong += [f"commanded: {name}" for name in differing(state_of(world, robot.state()), ends[0])]
+    wrong += [f"commanded: {name}" for name in differing(state_of(world, robot), ends[0])]
     return [f"seed {seed} after {', '.join(log)}: {each}" for each in wrong]
 
 
-@pytest.mark.parametrize(
-    "dynamics",
-    [pytest.param(False, marks=pytest.mark.long), pytest.param(True, marks=pytest.mark.long)],
-    ids=["kinematic", "dynamic"],
-)
-def test_copies_of_a_few_random_robots(tmp_path, dynamics):
-    """Of the same, so many as take seconds."""
-    assert [each for seed in range(2) for each in check(seed, tmp_path, dynamics)] == []
-
-
 @pytest.mark.long
-@pytest.mark.parametrize("seeds", [range(2, 5), pytest.param(range(5, 22), marks=pytest.mark.slow)], ids=str)
-@pytest.mark.parametrize("dynamics", [False, True], ids=["kinematic", "dynamic"])
-def test_copies_of_random_robots(tmp_path, dynamics, seeds):
-    """Twenty sequences each: imagined, restored, commanded by world and adopted robots, equal now and later."""
-    assert [each for seed in seeds for each in check(seed, tmp_path, dynamics)] == []
+@pytest.mark.parametrize("seeds", [range(2), range(2, 5), pytest.param(range(5, 22), marks=pytest.mark.slow)], ids=str)
+@pytest.mark.parametrize("kind", ["kinematic", "pressing", "gripping"])
+def test_copies_of_random_robots(tmp_path, kind, seeds):
+    """Twenty sequences each: imagined, restored, commanded by world and adopted robots, equal now and later.
+
+    Hands of robots that begin with dynamics press with their fingers, or have none and grip.
+    """
+    assert [each for seed in seeds for each in check(seed, tmp_path, kind)] == []

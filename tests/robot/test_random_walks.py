@@ -116,9 +116,14 @@ def room(dynamics):
     return robot
 
 
-def state_of(world, state, k=None):
+def state_of(world, robot, k=None):
     """All that there is to see of a world and its robot, or of world k of a batch."""
+    state, hands = robot.state() if k is None else robot.state()[k], robot.hands
     found = {"q": state.q, "v": state.v, "a": state.a, "collision": np.array(str(state.collision))}
+    for name, hand in hands.items():
+        held = {body.name for body in hand.held} if k is None else {body for body, own in hand.held.items() if own[k]}
+        gripper = robot.grippers[name] if k is None else robot._grippers[name][k]
+        found[name] = str((sorted(held), None if gripper.goal is None else (gripper.goal.status, gripper.goal.holds)))
     for body in world.bodies:
         found[body.name] = body.vertices if k is None or body.vertices.ndim == 2 else body.vertices[k]
     return found
@@ -129,32 +134,39 @@ def differing(found, expected):
     return [name for name, own in expected.items() if not np.array_equal(found[name], own)]
 
 
-def imagined(futures, ways, sec, seconds):
-    """Let copies go their ways, and an arm of theirs on the way; return what they came to."""
+def states_of(futures):
+    """The same of each world of a batch."""
+    return [state_of(futures, futures.robot, k) for k in range(futures.world_count)]
+
+
+def imagined(futures, ways, sec, seconds, grasps):
+    """Let copies go their ways, open or close a hand and move an arm on the way; return what they came to."""
     if sec == JOYSTICK:
         futures.robot.send_velocity(*ways.T)
     else:
         futures.robot.go_pos(*ways.T) if sec is None else futures.robot.go_velocity(*ways.T, sec)
+    futures.robot.move_gripper("larm", grasps)
     futures.run(seconds)
     futures.robot.angle_vector({ARM: -1.0}, 0.3)
     if sec == JOYSTICK:
         futures.robot.send_velocity(*-ways.T, 3.0)
     futures.run(seconds)
-    return [state_of(futures, state, k) for k, state in enumerate(futures.robot.state())]
+    return states_of(futures)
 
 
-def alone(robot, way, sec, seconds):
+def alone(robot, way, sec, seconds, grasp):
     """Let the robot do the same in its own world."""
     if sec == JOYSTICK:
         robot.send_velocity(*way)
     else:
         robot.go_pos(*way, wait=False) if sec is None else robot.go_velocity(*way, sec, wait=False)
+    robot.move_gripper("larm", float(grasp), wait=False)
     robot.world.run(seconds)
     robot.angle_vector({ARM: -1.0}, 0.3)
     if sec == JOYSTICK:
         robot.send_velocity(*-way, 3.0)
     robot.world.run(seconds)
-    return state_of(robot.world, robot.state())
+    return state_of(robot.world, robot)
 
 
 def check(seed, dynamics):
@@ -171,18 +183,16 @@ def check(seed, dynamics):
         except nuno.NunoError as error:
             log[-1] += f" ({type(error).__name__})"
     robot.world.run(random.choice([0.05, 1.0, 4.0]))
-    if dynamics:  # where hands that close grip nothing in copies: they have closed or opened before
-        closing = [own for own in robot.grippers.values() if own.will_hold]
-        robot.wait_until(lambda: not any(own.will_hold for own in closing), timeout=2.0)
     kinds = (None, 1.0) if dynamics else (None, 1.0, JOYSTICK)
     saved, sec = world.save(), kinds[random.integers(len(kinds))]
     ways = random.uniform(-0.2, 0.2, (3, 3)) * (1.0 if sec is None else 0.15)  # strides are as long as they are
-    ways[2] = ways[0]
+    grasps = random.integers(0, 2, 3)
+    ways[2], grasps[2] = ways[0], grasps[0]
     wrong, futures = [], world.imagine(3)
-    ends = imagined(futures, ways, sec, AHEAD)
+    ends = imagined(futures, ways, sec, AHEAD, grasps)
     for k in range(2):
         world.restore(saved)
-        expected = alone(robot, ways[k], sec, AHEAD)
+        expected = alone(robot, ways[k], sec, AHEAD, grasps[k])
         wrong += [f"walk {k}: {name}" for name in differing(ends[k], expected)]
     wrong += [f"the same walk: {name}" for name in differing(ends[2], ends[0])]
 
@@ -191,22 +201,22 @@ def check(seed, dynamics):
     kept, again = futures.save(), futures.imagine(1, world=1)
     futures.run(AHEAD)
     again.run(AHEAD)
-    later = [state_of(futures, state, k) for k, state in enumerate(futures.robot.state())]
-    wrong += [f"copy of a copy: {name}" for name in differing(state_of(again, again.robot.state()[0], 0), later[1])]
+    later = states_of(futures)
+    wrong += [f"copy of a copy: {name}" for name in differing(states_of(again)[0], later[1])]
     futures.restore(kept)
     world.adopt(futures, 1)
     futures.run(AHEAD)
     world.run(AHEAD)
-    for k, state in enumerate(futures.robot.state()):
-        wrong += [f"restored batch, {k}: {name}" for name in differing(state_of(futures, state, k), later[k])]
-    wrong += [f"adopted: {name}" for name in differing(state_of(world, robot.state()), later[1])]
+    for k, own in enumerate(states_of(futures)):
+        wrong += [f"restored batch, {k}: {name}" for name in differing(own, later[k])]
+    wrong += [f"adopted: {name}" for name in differing(state_of(world, robot), later[1])]
 
     # commands alone, from the same moment
     world.restore(saved)
     world.adopt(futures, 0, only="commands")
     world.run(AHEAD)
     world.run(AHEAD)  # in the same steps, as sums of times are rounded
-    wrong += [f"commanded: {name}" for name in differing(state_of(world, robot.state()), ends[0])]
+    wrong += [f"commanded: {name}" for name in differing(state_of(world, robot), ends[0])]
     return [f"seed {seed} after {', '.join(log)}: {each}" for each in wrong[:5]]
 
 
@@ -225,24 +235,24 @@ def test_fingers_that_are_opened_let_go_in_copies_too():
     assert not closed["left_hand"]  # the towel was between its fingers
     robot.angle_vector({ARM: -1.0}, 0.2)
     world.run(0.2)
-    alone = state_of(world, robot.state())
+    alone = state_of(world, robot)
 
     futures.run(0.4)
     again, kept = futures.imagine(1, world=1), futures.save()
     for _ in range(2):  # the second time from where the batch went back to
         futures.robot.angle_vector({ARM: -1.0}, 0.2)
         futures.run(0.2)
-        for k, state in enumerate(futures.robot.state()):
-            assert differing(state_of(futures, state, k), alone) == []
+        for own in states_of(futures):
+            assert differing(own, alone) == []
         futures.restore(kept)
     again.robot.angle_vector({ARM: -1.0}, 0.2)
     again.run(0.2)
-    assert differing(state_of(again, again.robot.state()[0], 0), alone) == []
+    assert differing(states_of(again)[0], alone) == []
     world.restore(saved)
     world.adopt(futures, 1)
     robot.angle_vector({ARM: -1.0}, 0.2)
     world.run(0.2)
-    assert differing(state_of(world, robot.state()), alone) == []
+    assert differing(state_of(world, robot), alone) == []
 
 
 @pytest.mark.long

@@ -59,10 +59,10 @@ class FingerDynamics:
         bodies: Theirs.
         joints: Their sliders while attached.
         limits: The most that the fingers of each hand can press with [N], by its name.
-        closed: Whether each hand was told to close: it presses on what stops it until it is told to open, or its joint
-            is wanted clearly more open than it is; a vector of all joints' angles as they are does not loosen it.
-            Of copies (worlds,) bool, where they differ.
-        forces: The most that the fingers of each hand press with now [N]; the limits at first.
+        closed: Whether each hand was told to close, (worlds,) bool: it presses on what stops it until it is told to
+            open, or its joint is wanted clearly more open than it is; a vector of all joints' angles as they are does
+            not loosen it.
+        forces: The most that the fingers of each hand press with now [N], (worlds,); the limits at first.
     """
 
     def __init__(self, links: Links, efforts: np.ndarray) -> None:
@@ -73,9 +73,18 @@ class FingerDynamics:
         self.joints: tuple[Joint, ...] = ()
         limits = {finger.hand: float(efforts[finger.row] * finger.force_of_effort) for finger in self.fingers}
         self.limits = {hand: min(force, ENDLESS) for hand, force in limits.items()}
-        self.forces = dict(self.limits)
-        self.closed: dict[str, Any] = dict.fromkeys(self.limits, False)
+        self._loosen()
         self._turning: dict[int, np.ndarray] = {}  # by joint, what each finger is given of the inertia it carries
+
+    def _loosen(self) -> None:
+        count = self.world.world_count
+        self.forces = {hand: np.full(count, most) for hand, most in self.limits.items()}
+        self.closed = {hand: np.zeros(count, dtype=bool) for hand in self.limits}
+
+    def command(self, hand: str, effort: float, closed: bool, world: int = 0) -> None:
+        """Let a hand press with an effort [N] at most in one world, and as one that was told to close or to open."""
+        if hand in self.limits:
+            self.forces[hand][world], self.closed[hand][world] = min(effort, self.limits[hand]), closed
 
     def left(self, joint: int, inertia: Any) -> Any:
         """Return what is left without fingers of the inertia that a joint carries, as Pinocchio has it."""
@@ -135,26 +144,19 @@ class FingerDynamics:
         """
         if not self.joints:
             return {}
-        slides, forces = self.slides(), np.array([self.forces[finger.hand] for finger in self.fingers])
+        slides, forces = self.slides(), np.stack([self.forces[finger.hand] for finger in self.fingers], axis=1)
         goals = np.empty(slides.shape)
         for k, finger in enumerate(self.fingers):
             goal = finger.slide(wanted)
-            presses = goal >= finger.far
-            if np.any(self.closed[finger.hand]):
-                presses = presses | (self.closed[finger.hand] & (goal > slides[:, k] - OPENS))
+            presses = (goal >= finger.far) | (self.closed[finger.hand] & (goal > slides[:, k] - OPENS))
             goals[:, k] = np.where(presses, finger.far + AHEAD, goal)
-        stiffness, still = forces / AHEAD, np.zeros(len(forces))
+        stiffness, still = forces / AHEAD, np.zeros(len(self.fingers))
         goals = np.clip(goals, slides - AHEAD, slides + AHEAD)
         set_motors(self.joints, goals, still, stiffness, DAMPED * stiffness, forces, still)
         return {finger.row: finger.angle(slides[:, k]) for k, finger in enumerate(self.fingers)}
 
-    def become(self, copies: FingerDynamics, world: int) -> None:
-        """Press as the copies in one world of a batch do."""
-        self.forces = dict(copies.forces)
-        self.closed = {hand: bool(np.ravel(own)[world if np.ndim(own) else 0]) for hand, own in copies.closed.items()}
-
     def imagined(self, world: World, bodies: Sequence[Body], joints: Mapping[str, Any]) -> FingerDynamics:
-        """Return the same for copies in a batch.
+        """Return the same for copies in a batch, none of which was told anything yet.
 
         Args:
             world: The batch.
@@ -165,7 +167,7 @@ class FingerDynamics:
         made.world = world
         made.bodies = tuple(bodies[own[0]] for own in self._links.finger_bodies.bodies)
         made.joints = tuple(joints[joint.key] for joint in self.joints)
-        made.forces, made.closed = dict(self.forces), dict(self.closed)
+        made._loosen()
         return made
 
 

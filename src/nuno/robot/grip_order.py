@@ -64,7 +64,10 @@ class GripQueue:
         self.waiting = tuple(own for own in self.waiting if own.hand != hand)
 
     def take_up(self) -> None:
-        """Carry out what is due by now."""
-        while self.waiting and self.waiting[0].clock <= self._joints.clock + SOON:
-            order, self.waiting = self.waiting[0], self.waiting[1:]
+        """Carry out what is due by now; what other hands were told waits on."""
+        now = self._joints.clock + SOON
+        due = [own for own in self.waiting if own.clock <= now and own.hand in self._grippers]
+        if due:
+            self.waiting = tuple(own for own in self.waiting if own not in due)
+        for order in due:
             self._grippers[order.hand].send(order.position, order.effort, among_others=True)

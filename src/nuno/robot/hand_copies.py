@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +16,6 @@ from nuno.shapes.surface import SurfacePoints
 from nuno.world.grips_of_worlds import grip_in_worlds
 
 if TYPE_CHECKING:
-    from nuno.robot.wanted_motion import WantedMotion
     from nuno.world.world import World
 
 VERTEX = 1e-6
@@ -29,15 +28,13 @@ class HandCopy(Hand):
     Args:
         hand: The hand itself.
         copies: The hand in all worlds.
-        motion: How the robot moves in this one.
         index: Which world.
     """
 
-    def __init__(self, hand: Hand, copies: HandCopies, motion: WantedMotion, index: int) -> None:
+    def __init__(self, hand: Hand, copies: HandCopies, index: int) -> None:
         self.__dict__.update(hand.__dict__)  # which are of its robot, and the same in all worlds
-        self.body, self._grips, self.pressed = copies.body, [], ()
-        self._copies, self._motion, self._k = copies, motion, index
-        self.angles: np.ndarray | None = None  # (n,) of the joints, where the motion is not up to date
+        self.body, self._grips, self.pressed = copies.body, [], frozenset()
+        self._copies, self._k = copies, index
 
     def open(self) -> None:
         """Let go of everything in this world."""
@@ -49,7 +46,7 @@ class HandCopy(Hand):
         return self._copies.world
 
     def _joint_angles(self) -> np.ndarray:
-        return self._motion.joints.positions if self.angles is None else self.angles
+        return self._copies.angles_in(self._k)
 
     def _others(self) -> list[Body]:
         return self._copies.others()
@@ -75,33 +72,34 @@ class HandCopy(Hand):
 class HandCopies:
     """A hand in every world of a batch: ``world.imagine(n).robot.hands[name]``.
 
-    It closes, grips and lets go in each world by itself, with the bits of the hand alone.
+    It closes, grips or presses, and lets go in each world by itself, with the bits of the hand alone.
 
     Args:
         hand: The hand itself.
         world: The batch.
         links: The copies of all links of the robot, in their order.
-        motions: How the robot moves in each world.
+        angles_in: (world) -> where the robot's joints are there, (n,) [rad; m for slides].
 
     Attributes:
         name: The hand's.
         world: The batch.
         body: The copy of the link that carries it.
+        angles_in: As above.
         copies: The hand in each world.
         released: Grips that are to go, and in which world.
         taken: Bodies that are to be held, and of each world where.
     """
 
     def __init__(
-        self, hand: Hand, world: World, links: Sequence[Body], motions: Sequence[WantedMotion]
+        self, hand: Hand, world: World, links: Sequence[Body], angles_in: Callable[[int], np.ndarray]
     ) -> None:  # fmt: skip
         own = {link: copy for link, copy in zip(hand.links.bodies, links, strict=True)}
-        self.name, self.world, self.body = hand.name, world, own[hand.body]
+        self.name, self.world, self.body, self.angles_in = hand.name, world, own[hand.body], angles_in
         self._links, self._shapes = set(links), [own[link] for link in carried_by(hand.links, hand.body)]
         self.released: list[tuple[Grip, int]] = []
         self.taken: dict[Body, dict[int, Any]] = {}
         self._seen: dict[Body, np.ndarray] = {}
-        self.copies = tuple(HandCopy(hand, self, motion, k) for k, motion in enumerate(motions))
+        self.copies = tuple(HandCopy(hand, self, k) for k in range(world.world_count))
 
     def __repr__(self) -> str:
         return f"<{self.name} in {self.world.world_count} worlds, holds something in {int(self.holds.sum())}>"
@@ -110,7 +108,7 @@ class HandCopies:
     def holds(self) -> np.ndarray:
         """(worlds,) bool, where it holds anything."""
         with self.world.lock:
-            return np.array([bool(copy.grips) for copy in self.copies])
+            return np.array([bool(copy.held) for copy in self.copies])
 
     @property
     def held(self) -> dict[str, np.ndarray]:

@@ -65,7 +65,7 @@ class Hand:
         self._shapes = carried_by(links, self.body)
         self._grips: list[Grip] = []
         self._fingers = [[links.names[k] for k in own] for own in links.finger_bodies.of_hand(name)]  # links of each
-        self.pressed: tuple[Body, ...] = ()  # in the last frame, by all fingers
+        self.pressed: frozenset[str] = frozenset()  # names of bodies, in the last frame, by all fingers
 
     def __repr__(self) -> str:
         held = ", ".join(body.name for body in self.held) or "nothing"
@@ -80,7 +80,7 @@ class Hand:
     def held(self) -> tuple[Body, ...]:
         """The bodies that it holds: what it grips, or what all its fingers pressed on in the last frame."""
         if self.presses:
-            return tuple(body for body in self.pressed if body in self.links.world.bodies)
+            return tuple(body for body in self._world.bodies if body.name in self.pressed)
         return tuple(grip.body for grip in self.grips)
 
     @property
@@ -304,26 +304,14 @@ def width_at(own: HandOnFrame, angle: np.ndarray) -> np.ndarray:
     return np.asarray(own.width * np.clip((angle - own.closed) / (own.open - own.closed), 0.0, 1.0))
 
 
-def pressed_by(hand: Hand, contacts: Contacts) -> tuple[Body, ...]:
-    """Return the bodies that all fingers of a hand pressed on in the frame that ended; none where it does not press.
+def pressed_by(hand: Hand, contacts: Contacts) -> frozenset[str]:
+    """Return the names of bodies that all fingers of a hand pressed on in a frame; none where it does not press.
 
     Args:
         hand: The hand.
         contacts: What touched the robot's links in the frame.
     """
     if not hand.presses:
-        return ()
-    names = pressed_names(hand, contacts, hand.links.bodies)
-    return tuple(body for body in hand.links.world.bodies if body.name in names)
-
-
-def pressed_names(hand: Hand, contacts: Contacts, links: Sequence[Body]) -> set[str]:
-    """Return the names of what all fingers of a hand that presses touch.
-
-    Args:
-        hand: The hand.
-        contacts: What touched the robot's links in the frame, or those of its copy.
-        links: The robot's, or the copy's, which are left out.
-    """
+        return frozenset()
     names = set.intersection(*({name for link in own for name in contacts.get(link, ())} for own in hand._fingers))
-    return names - {body.name for body in links}
+    return frozenset(names - {body.name for body in hand.links.bodies})

@@ -21,8 +21,10 @@ from nuno.world.grips_of_worlds import drop_empty_grips, grips_by_key
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
+    from nuno.robot.balance import Balance
     from nuno.robot.imagined_sensors import ImaginedSensors
     from nuno.robot.motion_batch import MotionBatch
+    from nuno.robot.robot_state import RobotState
     from nuno.robot.wanted_motion import WantedMotion
     from nuno.world.world import World
 
@@ -30,17 +32,20 @@ logger = logging.getLogger(__name__)
 
 
 class ImaginedHands:
-    """Hands of ``ImaginedRobot``, without dynamics.
+    """Hands of ``ImaginedRobot``.
 
-    What is between the fingers when they are to close is held from when they have, in each world by itself, with the
-    bits of the robot alone.
+    What is between the fingers when they are to close is held from when they have, or pressed on by fingers with
+    dynamics, in each world by itself, with the bits of the robot alone.
 
     Attributes:
-        hands: The hands, by name; none where the copies have dynamics.
+        hands: The hands that can be commanded, by name; where another engine than Nuno's own computes, those whose
+            fingers press.
     """
 
     original: Any
     world: World
+    balance: Balance | None
+    _states: list[RobotState]
     _motions: list[WantedMotion]
     _sent: list[tuple[Any, ...]]
     _links: list[Body]
@@ -49,10 +54,11 @@ class ImaginedHands:
     _chosen_worlds: Callable[[Any], list[int]]
 
     hands: dict[str, HandCopies]
-    _grippers: dict[str, list[SimulatedGripper]]
+    _grippers: dict[str, list[SimulatedGripper]]  # those that cannot be commanded, too, as they were imagined
     _queues: list[GripQueue]
     _hands_before: dict[str, Any]  # as the robot itself was imagined
     _orders_before: tuple[GripOrder, ...]
+    _ended: np.ndarray | None  # (worlds, n), where joints are, while a frame ends whose motion is not up to date
 
     @checked
     def start_grasp(
@@ -72,7 +78,7 @@ class ImaginedHands:
         Raises:
             UnknownNameError: another arm, or a hand that the robot lacks.
             InvalidInputError: no effort, or worlds that there are not.
-            BodyStateError: the copies have dynamics, or a link was removed from the batch.
+            BodyStateError: a hand that another engine cannot let grip, or a link was removed from the batch.
         """
         ended = self._move_hands(arm, 0.0, effort, worlds, wait)
         return [np.array([goal.holds is True for goal in own]) for own in ended]
@@ -116,14 +122,12 @@ class ImaginedHands:
             raise UnknownNameError("arm", arm, list(ARMS))
         with self.world.lock:
             chosen = self._chosen_worlds(worlds)
-            self._check_hands()
             own = np.broadcast_to(finite_array("pos", pos, (), (len(chosen),)), len(chosen))
             if ((own < 0.0) | (own > 1.0)).any():
                 raise InvalidInputError(f"pos must be in 0 to 1, got {pos!r}")
-            names = [name for name in ARMS[arm] if arm != "arms" or name in self.hands]
+            names = [name for name in ARMS[arm] if arm != "arms" or name in self._grippers]
             for name in names:
-                if name not in self.hands:
-                    raise UnknownNameError("hand", name, list(self.hands))
+                self._check_hand(name)
             goals: list[list[Goal]] = []
             for name in names:
                 goals.append([])
@@ -139,43 +143,49 @@ class ImaginedHands:
             self.world.step()
         return goals
 
-    def _check_hands(self) -> None:
-        if not self.hands and self.original.grippers:
+    def _check_hand(self, name: str) -> None:
+        if name in self._grippers and name not in self.hands:
             raise BodyStateError(
-                f"the hands of {self.original.actual.name!r} are not commanded in copies with dynamics, or by another "
-                "engine than Nuno's own: command the robot's before they are imagined"
+                f"{name} of {self.original.actual.name!r} grips what it closes on, and copies of hands that do are not "
+                "commanded by another engine than Nuno's own: command the robot's before they are imagined"
             )
+        if name not in self.hands:
+            raise UnknownNameError("hand", name, list(self.hands))
 
-    def _make_hands(
-        self, of: tuple[ImaginedHands, int] | None, goals: Sequence[Mapping[int, Goal]], grip: bool
-    ) -> None:
+    def _make_hands(self, of: tuple[ImaginedHands, int] | None, goals: Sequence[Mapping[int, Goal]]) -> None:
         """Let each copy's hands go on with what the robot's, or those of other copies, do.
 
         Args:
             of: The copies that these are copies of, and which of them; None where the robot itself is copied.
             goals: For each copy, which goals of its joints stand for those it was copied from, by ``id``.
-            grip: Whether they open and close by themselves.
         """
-        self.hands, self._grippers = {}, {}
+        self.hands, self._grippers, self._ended = {}, {}, None
         drop_empty_grips(self.world, self._links)
         self._orders_before = self.original.grip_orders() if of is None else of[0]._orders_before
-        waiting = self._orders_before
-        if of is not None and of[0]._queues:
-            waiting = of[0]._queues[of[1]].waiting
+        waiting = self._orders_before if of is None else of[0]._queues[of[1]].waiting
         grips, self._hands_before = grips_by_key(self.world), {}
-        for name, original in self.original.grippers.items() if grip else ():
-            hand = self.hands[name] = HandCopies(original.hand, self.world, self._links, self._motions)
+        fingers = None if self.balance is None else self.balance.dynamics.fingers
+        for name, original in self.original.grippers.items():
+            hand = HandCopies(original.hand, self.world, self._links, self._angles_in)
+            if self.world.engine.is_builtin or hand.copies[0].presses:
+                self.hands[name] = hand
             saved = original.save() if of is None else of[0]._grippers[name][of[1]].save()
             self._hands_before[name] = saved if of is None else of[0]._hands_before[name]
             made = self._grippers[name] = []
-            for copy, motion, own in zip(hand.copies, self._motions, goals, strict=True):
-                made.append(SimulatedGripper(copy, motion.joints, is_copy=True))
+            for w, (copy, motion, own) in enumerate(zip(hand.copies, self._motions, goals, strict=True)):
+                made.append(SimulatedGripper(copy, motion.joints, fingers, world=w))
                 made[-1].take_over(saved, own, grips)
         self._queues = []
-        for w, motion in enumerate(self._motions if grip else ()):
-            own_grippers = {name: grippers[w] for name, grippers in self._grippers.items()}
+        for w, motion in enumerate(self._motions):
+            own_grippers = {name: self._grippers[name][w] for name in self.hands}
             self._queues.append(GripQueue(own_grippers, motion.joints))
             self._queues[-1].waiting = waiting
+
+    def _angles_in(self, world: int) -> np.ndarray:
+        """Return where the joints of one world's are (n,)."""
+        if self.balance is not None:
+            return np.asarray(self.original.actual.angles_of(self._states[world].q))
+        return self._motions[world].joints.positions if self._ended is None else self._ended[world]
 
     def _settle(self, name: str) -> None:
         rigid = self.hands[name].settle()
@@ -186,7 +196,7 @@ class ImaginedHands:
         """Return in how many of the next frames no hand does anything but in the last."""
         if any(queue.waiting for queue in self._queues):
             return 1
-        for grippers in self._grippers.values():
+        for grippers in (self._grippers[name] for name in self.hands):
             if not all(own.is_at_rest for own in grippers):
                 return 1
             widths = np.array([own.loose for own in grippers])
@@ -207,17 +217,21 @@ class ImaginedHands:
             for name in self.hands:
                 self._settle(name)
 
-    def _end_hands(self, angles: np.ndarray) -> None:
-        """Let hands take hold or let go at the end of a frame, where the joints are at angles (worlds, n)."""
-        for name, grippers in self._grippers.items():
-            busy = [w for w, own in enumerate(grippers) if self._has_to_do(own)]
+    def _end_hands(self, angles: np.ndarray | None = None) -> None:
+        """Let hands take hold or let go at the end of a frame.
+
+        Args:
+            angles: (worlds, n), where joints without dynamics are then.
+        """
+        self._ended, wanted = angles, self._together.wanted
+        for name, hand in self.hands.items():
+            grippers, presses = self._grippers[name], hand.copies[0].presses
+            busy = [w for w, own in enumerate(grippers) if presses or self._has_to_do(own)]
             for w in busy:
-                copy: Any = grippers[w].hand
-                copy.angles = angles[w]
-                grippers[w].end_frame({})
-                copy.angles = None
+                grippers[w].end_frame(self._states[w].contacts, wanted[w])
             if busy:
                 self._settle(name)
+        self._ended = None
 
     @staticmethod
     def _has_to_do(gripper: SimulatedGripper) -> bool:
@@ -239,8 +253,6 @@ class ImaginedHands:
         """Return how the robot's hands were as it was imagined, by name, and what they were to do later."""
         return self._hands_before, self._orders_before
 
-    def grippers_of(self, world: int) -> tuple[dict[str, Any], tuple[GripOrder, ...]] | None:
-        """Return how the hands of one world are, by name, and what they are to do later; None where nobody knows."""
-        if not self._queues:
-            return None
+    def grippers_of(self, world: int) -> tuple[dict[str, Any], tuple[GripOrder, ...]]:
+        """Return how the hands of one world are, by name, and what they are to do later."""
         return {name: own[world].save() for name, own in self._grippers.items()}, self._queues[world].waiting

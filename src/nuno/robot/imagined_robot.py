@@ -20,7 +20,6 @@ from nuno.robot.imagined_sensors import ImaginedReadings, ImaginedSensors
 from nuno.robot.link_batch import LinkBatch
 from nuno.robot.motion_batch import MotionBatch
 from nuno.robot.motion_guard import MotionGuard
-from nuno.robot.pressing_hands import PressingHands
 from nuno.robot.robot_state import RobotState, RobotStates
 from nuno.robot.simulated_joints import Sent
 from nuno.robot.trajectory import JointTrajectory, passing_velocities
@@ -107,9 +106,8 @@ class ImaginedRobot(ImaginedBase, ImaginedHands):
         self._warned_of_legs = False
         self._base_goals: list[Goal | None] = [None] * world.world_count  # of walks that were refused
         self._links = [world.find(body.name) for body in original.links.bodies]
-        self.balance: Balance | None = None
-        if original.balance is not None and (original.is_dynamic if of is None else of[0].balance is not None):
-            self.balance = original.balance.imagined(world)
+        balance = (original.balance if original.is_dynamic else None) if of is None else of[0].balance
+        self.balance: Balance | None = None if balance is None else balance.imagined(world)
         self._states: list[RobotState] = [state] * world.world_count
         groups = {name: own.names for name, own in original.joints.controllers.items()}
         self._motions, goals = [], []
@@ -129,19 +127,13 @@ class ImaginedRobot(ImaginedBase, ImaginedHands):
             self._guards[k].load(found)
             own.gait.looks = self._guards[k].velocities_of(own)
         self._sensors: ImaginedSensors | None = None  # made when they are first read
-        alone = whole and world.engine.is_builtin and (of is None or bool(of[0].hands))
-        self._make_hands(of, goals, alone)
-        closing = [name for name, own in original.grippers.items() if of is None and own.will_hold]
-        if closing and not self.hands:
+        self._make_hands(of, goals)
+        closing = [name for name, own in original.grippers.items() if own.will_hold and name not in self.hands]
+        if closing and of is None:
             logger.warning(
                 "%s of %r closes: its copies' fingers go on, but grip nothing there; imagine when it holds",
                 " and ".join(closing), original.actual.name,
             )  # fmt: skip
-        self._pressing: PressingHands | None = None
-        if self.balance is not None:
-            source = None if of is None or of[0]._pressing is None else (of[0]._pressing, of[1])
-            fingers = self.balance.dynamics.fingers
-            self._pressing = PressingHands(original.grippers, fingers, self._links, goals, source)
         self._before = self._states
         self._ground = original.sensors.ground
         self._read: ImaginedReadings | None = None
@@ -340,9 +332,7 @@ class ImaginedRobot(ImaginedBase, ImaginedHands):
         ended = self.balance.ended(max(self.world.time - self._before[0].time, 1e-9))
         self._states = self.balance.judge(self._states, self._together.aims, ended, self.world.time)
         self._together.end(self._states)
-        if self._pressing is not None:
-            angles = np.array([self.original.actual.angles_of(state.q) for state in self._states])
-            self._pressing.end_frame(self._states, angles, self._together.wanted)
+        self._end_hands()
 
     def cancel_frame(self) -> None:
         """Go back to where the robot was when the frame began."""
@@ -375,10 +365,6 @@ class ImaginedRobot(ImaginedBase, ImaginedHands):
         if not self._is_whole():
             return None
         return ImaginedRobot(self.original, futures, (self, world))
-
-    def finger_motions(self, world: int) -> dict[str, Goal | None]:
-        """Return by hand with dynamics what moves the fingers of one world's, of what the hands were told."""
-        return {} if self._pressing is None else self._pressing.motions_of(world)
 
     def _is_whole(self) -> bool:
         """Return True as long as no link was removed from the batch; without all of them the robot does nothing."""

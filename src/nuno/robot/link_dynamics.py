@@ -10,7 +10,7 @@ import numpy as np
 
 from nuno.dynamics.dynamics import dynamics_of
 from nuno.errors import BodyStateError, InvalidInputError
-from nuno.joints.held_points import held_points
+from nuno.joints.held_points import held_points, holding
 from nuno.joints.joint import Joint, set_motors
 from nuno.joints.joint_drives import Spring
 from nuno.joints.joint_motion import positions_of, velocities_of
@@ -306,8 +306,8 @@ class LinkDynamics:
         found = np.zeros((self.world.world_count, self.robot.model.njoints, 6))
         for k, grip in held:
             force, torque = (np.atleast_2d(part) for part in grip.wrench)
-            for w, own in enumerate(found):
-                self._add(own, k, w, held_points(grip, w).mean(axis=0), force[w], torque[w])
+            for w in np.flatnonzero(holding(grip.spec, len(found))).tolist():
+                self._add(found[w], k, w, held_points(grip, w).mean(axis=0), force[w], torque[w])
         for w, forces in enumerate(pressing):
             for name, push in forces.items():
                 k = self.links.names.index(name)
@@ -333,8 +333,8 @@ class LinkDynamics:
         made.fingers = self.fingers.imagined(world, made.bodies, keys)
         return made
 
-    def take(self, copies: LinkDynamics | None, world: int) -> None:
-        """Have the joints of copies, whose ``world`` its own has become; None for copies without dynamics.
+    def take(self, copies: LinkDynamics | None) -> None:
+        """Have the joints of copies, one of whose worlds its own has become; None for copies without dynamics.
 
         They are others where the links were detached and attached since.
         """
@@ -343,17 +343,14 @@ class LinkDynamics:
             keys: dict[str, Any] = {grip.key: grip for grip in _grips_of(self.bodies)}
             self.joints = tuple(keys[joint.key] for joint in copies.joints)
             self.fingers.joints = tuple(keys[joint.key] for joint in copies.fingers.joints)
-            self.fingers.become(copies.fingers, world)
 
     def save(self) -> tuple[Any, ...]:
-        """Return its joints and how hard its fingers press, for ``load``."""
-        fingers = self.fingers
-        return self.joints, fingers.joints, dict(fingers.forces), dict(fingers.closed)
+        """Return its joints, for ``load``."""
+        return self.joints, self.fingers.joints
 
     def load(self, saved: tuple[Any, ...]) -> None:
         """Become what it was when a snapshot was taken."""
-        self.joints, self.fingers.joints, forces, closed = saved
-        self.fingers.forces, self.fingers.closed = dict(forces), dict(closed)
+        self.joints, self.fingers.joints = saved
 
 
 def _frames_of(

@@ -46,18 +46,19 @@ class SimulatedGripper:
         hand: The hand.
         joints: The robot's joints, of which the fingers' are some.
         fingers: The robot's fingers where they may have dynamics, or None.
-        is_copy: Whether it is one of many in imagined worlds, which tells nothing in the log.
+        world: Of a copy in imagined worlds, in which of them; it tells nothing in the log. None for the robot's own.
 
     Attributes:
         effort: How hard the fingers are to press at most [N]; infinite before anybody said.
+        closed: Whether it was told to close; see ``FingerDynamics``.
     """
 
     def __init__(
-        self, hand: Hand, joints: SimulatedJoints, fingers: FingerDynamics | None = None, is_copy: bool = False
+        self, hand: Hand, joints: SimulatedJoints, fingers: FingerDynamics | None = None, world: int | None = None
     ) -> None:  # fmt: skip
-        self.hand, self._joints, self._fingers, self._is_copy = hand, joints, fingers, is_copy
+        self.hand, self._joints, self._fingers, self._copy = hand, joints, fingers, world
         self.goal: Goal | None = None
-        self.effort = np.inf
+        self.effort, self.closed = np.inf, False
         self._motion: Goal | None = None
         self._closes, self._width = False, hand.description.width
         self._aim, self._last, self._waited = hand.description.width, hand.description.width, 0
@@ -96,9 +97,7 @@ class SimulatedGripper:
         self.goal = Goal(position)
         self.goal.status = GoalStatus.ACTIVE
         self.effort = effort = effort if effort > 0.0 else np.inf
-        if self._fingers is not None and self.hand.name in self._fingers.limits:
-            self._fingers.forces[self.hand.name] = min(effort, self._fingers.limits[self.hand.name])
-            self._fingers.closed[self.hand.name] = position == 0.0
+        self._command_fingers(position == 0.0)
         width = position * self.hand.description.width
         self._closes = width < self.hand.width or position == 0.0
         # one that is closed already closes on what it closed on before
@@ -112,15 +111,16 @@ class SimulatedGripper:
         self._motion = self._move(self.hand.joint_angles(width), among_others)
         return self.goal
 
-    def end_frame(self, contacts: Contacts) -> None:
+    def end_frame(self, contacts: Contacts, wanted: np.ndarray) -> None:
         """Take hold where the fingers have closed, and end the goal where they have come to rest.
 
         Args:
             contacts: What touched the robot's links in the frame.
+            wanted: Where its joints are wanted now, (n,) [rad; m for slides].
         """
         if self._fingers is not None:
             self.hand.pressed = pressed_by(self.hand, contacts)
-        self._let_go_where_opened()
+        self._let_go_where_opened(wanted)
         goal = self.goal
         if goal is None or goal.is_done or (self._motion is not None and not self._motion.is_done):
             return
@@ -147,15 +147,19 @@ class SimulatedGripper:
         """Return all that it is, for ``load``."""
         status = None if self.goal is None else (self.goal.status, self.goal.text)
         motion = (
-            self._motion, self._closes, self._width, self._aim, self._last, self._waited, self.effort, self._hold
+            self._motion, self._closes, self._width, self._aim, self._last, self._waited, self.effort, self.closed,
+            self._hold,
         )  # fmt: skip
         return self.goal, status, motion, self.hand.grips, self.hand.pressed
 
     def load(self, saved: tuple[Any, ...]) -> None:
-        """Become what it was."""
+        """Become what it was; a goal that came since is given up."""
+        if self.goal is not None and self.goal is not saved[0]:
+            self.goal.finish(GoalStatus.PREEMPTED, text="the world was restored, or a future adopted")
         self.goal, status, motion, grips, self.hand.pressed = saved
         self._motion, self._closes, self._width, self._aim, self._last, self._waited, self.effort = motion[:7]
-        self._hold = motion[7]
+        closed, self._hold = motion[7:]
+        self._command_fingers(closed)
         if self.goal is not None:
             self.goal.status, self.goal.text = status
         self.hand.take_grips(grips)
@@ -173,9 +177,10 @@ class SimulatedGripper:
             goes_on: Whether the joints are as they were then, and follow what they followed.
         """
         goal = saved[0]
+        if self.goal is not None and self.goal is not goal and not self.goal.is_done:
+            self.goal.finish(GoalStatus.PREEMPTED, text="another goal took its place")
+            self._command_fingers(self.closed and bool(self.hand.held))  # what met nothing yet stays where it is
         if goes_on and self.goal is not goal:
-            if self.goal is not None:
-                self.goal.finish(GoalStatus.PREEMPTED, text="another goal took its place")
             self.load(saved)
         elif not goes_on and self.was_busy(saved):
             self.send(goal.asked, saved[2][6], among_others=True)
@@ -189,36 +194,32 @@ class SimulatedGripper:
             grips: Those of this world, by key.
         """
         goal, status, motion, held, pressed = saved
-        if self.goal is not None:
-            self.goal.finish(GoalStatus.PREEMPTED, text="a future was adopted")
         own_goal = None if goal is None else goal.copy()
         here = tuple(grips[grip.key] for grip in held if grip.key in grips)
-        before, width = motion[7]
+        before, width = motion[8]
         known = tuple(grips[grip.key] for grip in before if grip.key in grips)
-        own_motion = standing_for(motion[0], goals), *motion[1:7], (known, width)
+        own_motion = standing_for(motion[0], goals), *motion[1:8], (known, width)
         self.load((own_goal, status, own_motion, here, pressed))
 
-    @property
-    def motion(self) -> Goal | None:
-        """The goal of the joints that moves the fingers, or did last; None where none did."""
-        return self._motion
+    def _command_fingers(self, closed: bool) -> None:
+        """Let fingers with dynamics press on what stops them, or no longer."""
+        self.closed = closed
+        if self._fingers is not None:
+            self._fingers.command(self.hand.name, self.effort, closed, self._copy or 0)
 
-    def go_with(self, motion: Goal | None, goals: Mapping[int, Goal]) -> None:
-        """Have a goal of a copy's joints, or what stands for it here by ``id``, move the fingers."""
-        self._motion = standing_for(motion, goals)
-
-    def _let_go_where_opened(self) -> None:
+    def _let_go_where_opened(self, wanted_angles: np.ndarray) -> None:
         """Let go of what is held where a vector of joint angles, and no gripper's goal, opens the fingers."""
-        hand, fingers = self.hand, self._fingers
+        hand = self.hand
         joint = hand.description.joint
-        presses = hand.presses and fingers is not None and fingers.closed[hand.name]
+        presses = hand.presses and self._fingers is not None and self.closed
         held, grips = (hand.held, ()) if presses else ((), hand.grips)
         if joint is None or not (held or grips):
             return
         if self._motion is not None and not self._motion.is_done:
             return  # a gripper's goal moves the fingers
         if presses:
-            wanted, width = self._wanted_width(joint), hand.width
+            row = hand.links.robot.joint_index(joint)
+            wanted, width = float(width_at(hand.description, wanted_angles[row])), hand.width
         else:
             wanted = hand.width
             if grips != self._hold[0]:
@@ -227,19 +228,15 @@ class SimulatedGripper:
         if wanted <= width + LOOSE:
             return
         names = " and ".join(sorted({body.name for body in held}))
-        tell = logger.debug if self._is_copy else logger.warning
+        tell = logger.warning if self._copy is None else logger.debug
         tell(
             "the %s of %r lets go of %s: %r was sent along and opens the fingers from %.3f m; send vectors in which "
             "that joint stays as it is (update_robot_state() and angle_vector() tell), or to one group of joints: "
             "angle_vector(angles, seconds, controller_type)", hand.name, hand.links.robot.name, names, joint, width,
         )  # fmt: skip
-        if presses and fingers is not None:
-            fingers.closed[hand.name] = False
+        if presses:
+            self._command_fingers(False)
         hand.open()
-
-    def _wanted_width(self, joint: str) -> float:
-        """Return how far apart the fingers are wanted [m]."""
-        return float(width_at(self.hand.description, self._joints.desired[0][self.hand.links.robot.joint_index(joint)]))
 
     def _is_moving(self) -> bool:
         """Return True as long as the fingers move, up to a while."""

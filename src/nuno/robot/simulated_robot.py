@@ -297,7 +297,7 @@ class SimulatedRobot(SimulatedBase):
             self._state = self._burden.after_frame(self._state, self.guard.met)
         self.joints.take_step(actual)
         for gripper in self.grippers.values():
-            gripper.end_frame(self._state.contacts)
+            gripper.end_frame(self._state.contacts, self.joints.desired[0])
         self.gait.end_frame()
 
     def cancel_frame(self) -> None:
@@ -355,20 +355,17 @@ class SimulatedRobot(SimulatedBase):
             if getattr(other, "original", None) is self:
                 if self.balance is not None:
                     copies = other.balance  # type: ignore[attr-defined]
-                    self.balance.dynamics.take(None if copies is None else copies.dynamics, k)
+                    self.balance.dynamics.take(None if copies is None else copies.dynamics)
                 joints = () if self.balance is None else self.balance.dynamics.save()
                 state, motion, servo, guard = other.saved_of(k)  # type: ignore[attr-defined]
                 self.load((state, motion, joints, self._save_hands(), servo, guard, self._burden.save()))
                 goals = self._motion.disown()
                 self._base_goal = self.gait.goal
                 drop_empty_grips(self.world, self.links.bodies)
-                if (copied := other.grippers_of(k)) is not None:  # type: ignore[attr-defined]
-                    grips = grips_by_key(self.world)
-                    for name, gripper in self.grippers.items():
-                        gripper.take_over(copied[0][name], goals, grips)
-                    self._grip_queue.waiting = copied[1]
-                for name, motion in other.finger_motions(k).items():  # type: ignore[attr-defined]
-                    self.grippers[name].go_with(motion, goals)
+                copied, self._grip_queue.waiting = other.grippers_of(k)  # type: ignore[attr-defined]
+                grips = grips_by_key(self.world)
+                for name, gripper in self.grippers.items():
+                    gripper.take_over(copied[name], goals, grips)
 
     def future_commands(self, futures: World, k: int) -> Callable[[], None]:
         """Return what lets the robot do from now on what its copy in one world of a batch was told to."""

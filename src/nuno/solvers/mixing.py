@@ -154,7 +154,7 @@ def mix_rigid(solver: RigidSolver, made: list[tuple[Copied, np.ndarray]]) -> Non
             kept = copied[f"contact_{name}"]
             width = kept.shape[2]  # rows may have been made longer since
             values[:, :, :width][parts] = kept[parts]
-            if name in ("partner", "count"):
+            if name in ("partner", "count", "impulse"):
                 values[:, :, width:][parts] = -1 if name == "partner" else 0
         _of_pairs(solver, name).assign(values)
     _mix_listing(solver, made)
