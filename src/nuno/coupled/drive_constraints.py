@@ -53,14 +53,17 @@ def wrapped(angle: float):
     return angle - 2.0 * wp.pi * wp.round(angle / (2.0 * wp.pi))
 
 
+MUCH = wp.constant(0.5)
+"""Share of what a joint bears at most, from which on its motor without a limit gives no more than before."""
 HOLDS, UNDECIDED = wp.constant(0), wp.constant(2)
 """Friction that holds, and a state of friction that is asked for. Where it slides the state is 1 or -1."""
 
 
 @wp.func
 def driven(
-    drive: wp.array(dtype=float), first: int, w: float, start: float, free: float, dt: float, state: int, may: int
-):
+    drive: wp.array(dtype=float), first: int, w: float, start: float, free: float, dt: float, state: int, may: int,
+    bound: float,
+):  # fmt: skip
     """Return how far the free direction comes from ``free``, and the slope there of what acts along it.
 
     The slope is what a unit more of way takes of the multiplier; it is infinite where a stop, friction or a motor that
@@ -75,6 +78,7 @@ def driven(
         dt: Of the substep [s].
         state: Whether friction held or slid, up to now; `UNDECIDED` before it is known.
         may: 0 where friction stays in that state.
+        bound: The most that a motor gives, a multiplier: see `motor_bound`.
 
     Returns:
         The two, and the state of friction.
@@ -91,7 +95,7 @@ def driven(
     force = k * (drive[first + REST] - start) + k * late * back + damp * back
     stiff = 1.0 / w + passive
     # motor
-    most = drive[first + EFFORT] * h2
+    most = wp.min(drive[first + EFFORT] * h2, bound)
     kd = drive[first + DAMPING]
     exact = wp.isinf(kd)
     a = drive[first + STIFFNESS] * h2
@@ -145,6 +149,21 @@ def driven(
 
 
 @wp.func
+def motor_bound(joints: Joints, r: int, dt: float):
+    """Return the most that a joint's motor without a limit gives in this pass: no more than before if it bears much.
+
+    What drives a body against one that cannot go finds no rest: pass after pass motor and contact grow, until
+    the joint bears no more and opens.
+    """
+    bound = float(wp.inf)
+    if wp.isinf(joints.drive[r * DRIVES + EFFORT]):
+        much = MUCH * joints.limit[r] * dt * dt
+        if wp.length_sq(joints.pull[r]) > much * much or wp.length_sq(joints.twist[r]) > much * much:
+            bound = wp.abs(joints.axial[r])
+    return bound
+
+
+@wp.func
 def project_axis(
     rigid: RigidState, joints: Joints, block: Block, world: int, k: int, dt: float, axis: wp.vec3, arm: wp.vec3,
     other_arm: wp.vec3,
@@ -175,7 +194,8 @@ def project_axis(
         w = wp.dot(axis, block.push * axis) + wp.dot(block.push * axis, pull) + wp.dot(turns, twist)
         pull = pull + axis
     old = joints.axial[r]
-    went, _slope, _state = driven(joints.drive, r * DRIVES, w, start, now - w * old, dt, UNDECIDED, 1)
+    bound = motor_bound(joints, r, dt)
+    went, _slope, _state = driven(joints.drive, r * DRIVES, w, start, now - w * old, dt, UNDECIDED, 1, bound)
     change = went / w - old
     joints.axial[r] = old + change
     joints.pull[r] = joints.pull[r] + pull * change

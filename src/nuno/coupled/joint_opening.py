@@ -3,7 +3,7 @@
 import warp as wp
 
 from nuno.coupled.articulated_inertia import Inertia, rest_of
-from nuno.coupled.drive_constraints import angle_about, driven
+from nuno.coupled.drive_constraints import angle_about, driven, motor_bound
 from nuno.coupled.joint_constraints import ROUNDING, joint_before
 from nuno.coupled.joint_response import (
     BALL,
@@ -298,8 +298,9 @@ def open_joint(rigid: RigidState, joints: Joints, trees: Trees, world: int, t: i
         old = joints.axial[r]
         w = 1.0 / inertia
         free = place - (along + old) * w
+        bound = motor_bound(joints, r, dt)
         went, slope, state = driven(
-            joints.drive, r * DRIVES, w, trees.opening[at].start, free, dt, joints.state[r], may
+            joints.drive, r * DRIVES, w, trees.opening[at].start, free, dt, joints.state[r], may, bound
         )
         joints.state[r] = state
         end = free + went

@@ -10,6 +10,7 @@ import warp as wp
 
 from nuno.rigid.caught_bodies import CAUGHT, FADED, is_caught, note_pressed
 from nuno.rigid.convex import Parts
+from nuno.rigid.first_guess import bound_guess
 from nuno.rigid.manifold import POINTS
 from nuno.rigid.pair_motion import (
     Going,
@@ -321,6 +322,7 @@ def mend_entry(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, dt:
             g.xb = g.xb - m.wb * back
             g.tb = g.tb - m.ib * wp.cross(rb, back)
             g.changed = 1
+    bound_guess(s, c, m, e, dt)
     keep_places(s, m, g)
     if deep == 1 and g.changed == 1:
         note_parted(s, m.i, m.wa)
