@@ -46,7 +46,9 @@ class Cells:
     count: int
 
     def nearest(self, ranked: Ranked) -> Ranked:
-        """Return how likely each candidate is the nearest to where the cloth was picked, as ``likely`` and scores.
+        """Return how likely each candidate is the nearest to where the cloth was picked, as ``likely``.
+
+        Scores stay, and with them the order: by these probabilities it was no better (docs/reports/accuracy.md).
 
         Args:
             ranked: With how likely each candidate is if one of them is where it was picked.
@@ -59,9 +61,7 @@ class Cells:
         own = self.around[:, 0]
         dense = np.exp(at_points - at_points.max())
         inside = np.bincount(own, dense, self.count) / np.maximum(np.bincount(own, minlength=self.count), 1)
-        likely = inside / inside.sum()
-        scores = np.where(np.isfinite(ranked.scores), np.log(np.maximum(likely, np.exp(FLOOR))), -np.inf)
-        return replace(ranked, scores=scores, likely=likely)
+        return replace(ranked, likely=inside / inside.sum())
 
 
 def cells_of(polygon: np.ndarray, candidates: np.ndarray, spacing: float) -> Cells:

@@ -47,8 +47,7 @@ class PickResult:
         scores: (k,) float by candidate, higher is better.
         score_name: What the scores are: "log_evidence" (of silhouettes) or "log_evidence_with_pattern", both with the
             prior of the lift unless ``sideways`` was None, "negative_chamfer_px" (minus the symmetric mean contour
-            distance in pixels of the image), "iou", "eq1". Of candidates that are spread over an outline evidence is
-            what their surroundings have (`nuno.estimate.between_candidates`), as logarithms of probabilities.
+            distance in pixels of the image), "iou", "eq1".
         eq1: (k,) float by candidate, the similarity of the paper's eq. (1), of futures that are not turned.
         rectangle: The cloth as it lay before, a ``ClothOutline`` where it was taken by its outline.
         camera: The camera, as the table's border or the cloth's outline told where it was told wrongly (a warning says
