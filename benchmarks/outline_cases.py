@@ -28,8 +28,15 @@ from nuno.camera.table import Table
 from nuno.mesh.triangulated import triangulate
 
 SHAPES = ("t-shirt", "trousers", "sock", "apron", "L", "towel")
+OTHERS = ("pullover", "skirt")
 SUBSTEPS = 35
-SCALE = {"t-shirt": 0.8, "trousers": 0.7, "sock": 1.2, "apron": 0.75, "L": 1.0, "towel": 0.9}
+SCALE = {
+    "t-shirt": 0.8, "trousers": 0.7, "sock": 1.2, "apron": 0.75, "L": 1.0, "towel": 0.9, "pullover": 0.7, "skirt": 0.8,
+}  # fmt: skip
+RIGIDITIES = {"usual": (2e-5, 1e-3), "wide": (5e-6, 3e-3)}
+"""Least and largest bending rigidity [N m]."""
+DENSITIES = {"usual": (0.1, 0.3), "wide": (0.08, 0.4)}
+"""The same of the area density [kg/m2]."""
 
 
 @dataclass
@@ -70,19 +77,23 @@ def cut(shape: str, rng: np.random.Generator, layers: int, scale: float) -> tupl
     return made.rest[used], number[front], made.rest[used]
 
 
-def generate(shapes: tuple[str, ...], picks: int, seed: int, device: str = "cpu", layers: int = 1) -> list[OutlineCase]:
+def generate(
+    shapes: tuple[str, ...], picks: int, seed: int, device: str = "cpu", layers: int = 1, materials: str = "usual"
+) -> list[OutlineCase]:
     """Make ``picks`` cases of each shape; the same seed makes the same cases on one device."""
     cases: list[OutlineCase] = []
     for k, shape in enumerate(shapes):
         rng = np.random.default_rng((seed, k))
         made: list[OutlineCase] = []
         while not made:
-            made = _scene(shape, rng, picks, device, layers)
+            made = _scene(shape, rng, picks, device, layers, materials)
         cases += made
     return cases
 
 
-def _scene(shape: str, rng: np.random.Generator, picks: int, device: str, layers: int) -> list[OutlineCase]:
+def _scene(
+    shape: str, rng: np.random.Generator, picks: int, device: str, layers: int, materials: str
+) -> list[OutlineCase]:
     table = Table(rng.uniform(0.70, 0.76), (0.5, 0.65), (0.1, 0.0))
     eye = np.array([rng.uniform(-1.0, -0.8), rng.uniform(-0.12, 0.14), table.height + rng.uniform(0.55, 0.75)])
     camera = looking_at(eye, np.array([0.1, 0.0, table.height + 0.1]), rng.uniform(430, 520))
@@ -103,8 +114,8 @@ def _scene(shape: str, rng: np.random.Generator, picks: int, device: str, layers
     futures = world.imagine(picks)
     body = futures.find("cloth")
     material = dict(
-        bending_rigidity=np.exp(rng.uniform(np.log(2e-5), np.log(1e-3), picks)),
-        area_density=rng.uniform(0.1, 0.3, picks), friction=rng.uniform(0.2, 0.8, picks),
+        bending_rigidity=np.exp(rng.uniform(*np.log(RIGIDITIES[materials]), picks)),
+        area_density=rng.uniform(*DENSITIES[materials], picks), friction=rng.uniform(0.2, 0.8, picks),
         thickness=rng.uniform(0.002, 0.0045, picks), air_drag=rng.uniform(0.5, 3.0, picks),
     )  # fmt: skip
     futures.find("table").friction = futures.find("floor").friction = material["friction"]
@@ -151,20 +162,23 @@ def judged(case: OutlineCase, device: str, stages: str) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def scene(shape: str, picks: int, seed: int, device: str, layers: int, stages: list[str]) -> list[dict[str, Any]]:
+def scene(
+    shape: str, picks: int, seed: int, device: str, layers: int, materials: str, stages: list[str]
+) -> list[dict[str, Any]]:
     """The lines of a scene's cases, each by all the stages by turns."""
-    made = generate((shape,), picks, seed, device, layers)
+    made = generate((shape,), picks, seed, device, layers, materials)
     return [judged(case, device, name) | {"seed": seed} for case in made for name in stages]
 
 
 def main() -> None:
     """Make cases, estimate, print a line of each."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--shapes", nargs="+", default=list(SHAPES), choices=SHAPES)
+    parser.add_argument("--shapes", nargs="+", default=list(SHAPES), choices=SHAPES + OTHERS)
     parser.add_argument("--scenes", type=int, default=4, help="of each shape")
     parser.add_argument("--picks", type=int, default=1, help="of each scene")
     parser.add_argument("--seed", type=int, default=9000)
     parser.add_argument("--layers", type=int, default=1, choices=[1, 2], help="of garments that have two")
+    parser.add_argument("--materials", choices=list(RIGIDITIES), default="usual", help="how far they differ")
     parser.add_argument("--stages", nargs="+", choices=NAMES, default=["now"], help="of pick_stages.py")
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--jobs", type=int, default=1, help="processes, each on one core")
@@ -172,7 +186,7 @@ def main() -> None:
     options = parser.parse_args()
     rows: list[dict[str, Any]] = []
     parts = [
-        (shape, options.picks, options.seed + k, options.device, options.layers, options.stages)
+        (shape, options.picks, options.seed + k, options.device, options.layers, options.materials, options.stages)
         for k in range(options.scenes)
         for shape in options.shapes
     ]

@@ -72,6 +72,7 @@ def test_settings_of_a_rectangle_stay_as_they_are(camera, cloth):
     with pytest.raises(InvalidInputError, match="spacing is for outlines"):
         with_outline_candidates(given, box, 0.1)
     changed = with_outline_candidates(given, cloth, 0.06)
+    assert changed.spacing == 0.06 and given.spacing is None
     assert not changed.learned and np.issubdtype(changed.labels.dtype, np.floating)
     np.testing.assert_allclose(changed.labels, changed.uv * (cloth.long_m, cloth.short_m))
     with pytest.raises(InvalidInputError, match="more than 1024"):
@@ -81,7 +82,9 @@ def test_settings_of_a_rectangle_stay_as_they_are(camera, cloth):
 def test_given_points_go_to_the_nearest_one_on_the_cloth(camera, cloth):
     """One inside stays; one in the bay of the L, or in a corner of its rectangle, goes to the outline."""
     uv = np.array([(u, v) for u in (0.1, 0.5, 0.9) for v in (0.1, 0.5, 0.9)])
-    found = with_outline_candidates(settings(camera, uv), cloth, None).labels
+    changed = with_outline_candidates(settings(camera, uv), cloth, None)
+    found = changed.labels
+    assert changed.spacing is None  # one of them is the pick
     asked = uv * (cloth.long_m, cloth.short_m)
     inside = contains(cloth.polygon, asked)
     assert inside.any() and not inside.all()

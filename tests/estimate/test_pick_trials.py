@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from test_pick_settings import settings
 
+from nuno.camera.cloth_outline import ClothOutline
 from nuno.camera.rectangle import ClothRectangle
 from nuno.estimate import pick_trials
 from nuno.estimate.hand_error import GROSS
@@ -38,7 +39,7 @@ reflected: list[int] = []
 
 def looked_at(
     monkeypatch: pytest.MonkeyPatch, chamfer: float, stages: tuple[Discretisation, ...] = STAGES, hand_is: int = 0,
-    **changes: Any,
+    cloth: ClothRectangle = RECTANGLE, **changes: Any,
 ) -> list[int]:  # fmt: skip
     """How many candidates of six each stage looks at, where all fit alike but for two, which are ``chamfer`` px off."""
     numbers: list[int] = []
@@ -68,8 +69,10 @@ def looked_at(
     monkeypatch.setattr(pick_trials, "imagine_picks", imagine)
     monkeypatch.setattr(pick_trials, "mirrored", reflect)
     given = settings(discretisations=stages, turns=(0.0,), learned=False, sideways=None, **changes)
+    if "spacing" in changes:
+        given = replace(given, labels=given.uv * (cloth.long_m, cloth.short_m))
     seen: Any = SimpleNamespace(warnings=(), hand_is=hand_is)
-    pick_trials.try_picks(given, RECTANGLE, lambda: seen, Stages("imagine", "see", "compile", "compare"))
+    pick_trials.try_picks(given, cloth, lambda: seen, Stages("imagine", "see", "compile", "compare"))
     return numbers
 
 
@@ -115,6 +118,18 @@ def test_no_estimate_ends_with_cloths_that_pass_through_themselves(monkeypatch):
     assert looked_at(monkeypatch, 1.5, **sure) == [6]
     stages = (replace(STAGES[0], self_contact=False), *STAGES[1:])
     assert looked_at(monkeypatch, 1.5, stages=stages, **sure) == [6, 2]
+
+
+def test_candidates_of_an_outline_are_as_sure_as_what_is_between_allows(monkeypatch):
+    """Two of six hold half each, so 0.4 ends an estimate; with what lies between them and the others each holds less.
+
+    Where candidates were given, and not spread at a spacing, one of them is taken for true, as of a rectangle.
+    """
+    outline = ClothOutline(CORNERS, 0.6, 0.4, np.zeros(3), 0.0, 0.0, outline=CORNERS)
+    points = np.stack(np.meshgrid((0.0, 0.5, 1.0), (0.0, 1.0)), axis=-1).reshape(-1, 2)
+    given = dict(cloth=outline, candidates=points, sure=0.4)
+    assert looked_at(monkeypatch, 20.0, **given) == [6]
+    assert len(looked_at(monkeypatch, 20.0, spacing=0.3, **given)) == 3
 
 
 def test_a_stage_may_look_at_a_larger_share(monkeypatch):

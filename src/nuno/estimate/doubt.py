@@ -104,7 +104,7 @@ def share_of_doubt(misfit: float, warnings: Sequence[str] = ()) -> float:
 
 def doubted(
     comparisons: Sequence[Comparison], score: str, count: int, log_prior_of_candidates: np.ndarray | None,
-    warnings: Sequence[str] = (),
+    warnings: Sequence[str] = (), temperature: float = TEMPERATURE,
 ) -> Ranked:  # fmt: skip
     """Rank the candidates, and tell how likely each is as far as the evidence may be trusted.
 
@@ -115,12 +115,13 @@ def doubted(
         log_prior_of_candidates: (count,) or (2, count) float, or None.
         warnings: Of how the images and the cloth are odd; none while more guesses may follow, for none of them would
             mend that.
+        temperature: By which the evidence's logarithms are divided.
     """
     ranked = rank(comparisons, score, count, log_prior_of_candidates)
     if score not in EVIDENCE or not np.isfinite(ranked.scores).any():
         return ranked
     without = rank(comparisons, score, count, log_prior_of_candidates, without_best=True)
-    with_and_without = (_log_shares(scores / TEMPERATURE) for scores in (ranked.scores, without.scores))
+    with_and_without = (_log_shares(scores / temperature) for scores in (ranked.scores, without.scores))
     logs = np.logaddexp(*with_and_without) - np.log(2.0)
     found = misfit(comparisons, int(ranked.order[0]))
     share = share_of_doubt(found, warnings)

@@ -212,12 +212,15 @@ OF_OUTLINES = (
     replace(_COARSE[0], settle_seconds=SETTLE_SECONDS, self_contact=False),
     replace(_COARSE[0], best=36, share=0.98, **_SPARING),
     *_COARSE[1:],
-    *DISCRETISATIONS[3:],
+    *(replace(stage, cells=15, substeps=10) for stage in DISCRETISATIONS[3:5]),
+    replace(DISCRETISATIONS[5], cells=12, substeps=8),
 )
-"""The same of a cloth that is taken by its outline, whose triangles take several times as long as a rectangle's grid:
-so the stages of many candidates are on a still coarser mesh, which told as much of them (docs/reports/accuracy.md), and
-the first guesses look at every candidate with cloths that pass through themselves, in a quarter of the time, and only
-at all that hold 98 % of the probability then with cloths that touch themselves. Of rectangles that told no more."""
+"""The same of a cloth that is taken by its outline, whose triangles take several times as long as a rectangle's grid.
+
+So each stage is on a coarser mesh, which told as much of outlines (docs/reports/accuracy.md). The first guesses look at
+every candidate with cloths that pass through themselves, in a quarter of the time, and only at all that hold 98 % of
+the probability then with cloths that touch themselves. Of rectangles that told no more.
+"""
 
 
 def cell_counts(long_m: float, short_m: float, cells: int, grid: tuple[int, int]) -> tuple[int, int]:

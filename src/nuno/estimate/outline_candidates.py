@@ -77,6 +77,7 @@ def with_outline_candidates(settings: PickSettings, cloth: ClothRectangle, spaci
             )
         return settings
     sides = np.array((cloth.long_m, cloth.short_m))
+    wanted: float | None = None
     if spacing is None and not np.issubdtype(settings.labels.dtype, np.integer):
         positions = settings.uv * sides
         outside = ~contains(cloth.polygon, positions)
@@ -87,7 +88,7 @@ def with_outline_candidates(settings: PickSettings, cloth: ClothRectangle, spaci
             raise InvalidInputError(f"spacing {wanted:g} m gives more than {MAX_CANDIDATES} candidates on this cloth")
         positions = outline_points(cloth, wanted)
     # what a network has learned of rectangles is not asked about other shapes
-    return replace(settings, labels=positions, uv=positions / sides, grid=(2, 2), learned=False)
+    return replace(settings, labels=positions, uv=positions / sides, grid=(2, 2), learned=False, spacing=wanted)
 
 
 def nearest_on_outline(polygon: np.ndarray, points: np.ndarray) -> np.ndarray:

@@ -41,8 +41,10 @@ class PickSettings:
         turns: (t,) float [rad]; 0 alone where something else than evidence ranks.
         poses: How futures are moved to be compared: turned, or shifted, for the hand may be elsewhere than told.
         hand_path: (k, 3) float [m], from the time when it held to ``hand``; None is not known.
+        sure: None is as much as is usual of what the cloth is taken for.
         device: "cpu" or "cuda:0" ...
         engine: What moves the imagined cloths.
+        spacing: Of candidates that are spread over an outline [m]; None of others.
     """
 
     camera: Camera
@@ -55,7 +57,7 @@ class PickSettings:
     hand_radius: float
     lift_seconds: float
     discretisations: Sequence[Discretisation]
-    sure: float
+    sure: float | None
     turns: np.ndarray
     poses: Poses
     hand_std: float
@@ -66,6 +68,7 @@ class PickSettings:
     device: str
     progress: bool | None
     engine: str = "nuno"
+    spacing: float | None = None
 
     @property
     def with_evidence(self) -> bool:
@@ -76,7 +79,7 @@ class PickSettings:
 def check_settings(
     *, camera: Camera | Mapping[str, Any], table: Table, hand: ArrayLike, candidates: tuple[int, int] | ArrayLike,
     discretisations: Sequence[Discretisation], turns: Sequence[float], score: str, device: str, rest_height: float,
-    lift_seconds: float, sure: float, sideways: float | None, engine: str = "nuno", hand_std: float = HAND_STD,
+    lift_seconds: float, sure: float | None, sideways: float | None, engine: str = "nuno", hand_std: float = HAND_STD,
     hand_path: Any = None, **others: Any,
 ) -> PickSettings:  # fmt: skip
     """Check the arguments of `nuno.estimate_pick` that are no images.
@@ -99,7 +102,8 @@ def check_settings(
     labels, uv, grid = _candidates(candidates)
     number("rest_height", rest_height, above=0.0)
     number("lift_seconds", lift_seconds, above=0.0, high=LONGEST_WAIT)
-    number("sure", sure, above=0.0, high=1.0)
+    if sure is not None:
+        number("sure", sure, above=0.0, high=1.0)
     if sideways is not None:
         number("sideways", sideways, above=0.0)
     if not isinstance(score, str) or score not in RANKINGS:
