@@ -127,6 +127,24 @@ def test_a_garment_is_found_by_its_background(holds):
         hold_mask(empty, empty, camera, HAND)
 
 
+@pytest.mark.parametrize("colour", [(180, 80, 50), (60, 60, 60)], ids=["red", "the floor's tint"])
+def test_a_shadow_is_no_garment(holds, colour):
+    """On the floor, where it touches the garment in the image; a grey garment on grey is not taken for a shadow."""
+    camera = nuno.Camera.look_at((1.9, 0.3, 0.8), (0, 0, 0.55), fov=0.65)
+    mask = hold_masks(holds, [(0, 0)], [0.0], camera, HAND)[0]
+    empty = np.full((*mask.shape, 3), (200, 200, 200), np.uint8)
+    rows, columns = np.nonzero(mask)
+    low, middle = rows.max(), int(columns[rows == rows.max()].mean())
+    shadow = np.zeros_like(mask)
+    shadow[low - 10 : low + 10, middle : middle + 60] = True
+    image = np.where(shadow[..., None], np.uint8(0.6 * empty), empty)
+    image = np.where(mask[..., None], np.array(colour, np.uint8), image)
+    found = hold_mask(image, empty, camera, HAND)
+    assert (found & mask).sum() > 0.97 * mask.sum()
+    if colour[0] != colour[1]:
+        assert (found & ~mask).sum() < 0.03 * mask.sum()
+
+
 def test_results_are_written(holds, tmp_path):
     """result.json has what the result has, and a picture lies beside it; a bad fit is told."""
     camera = camera_at(0.0)

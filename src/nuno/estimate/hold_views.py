@@ -35,6 +35,12 @@ MARGIN = 3
 """[px] around a garment's vertices, which is drawn thicker than they tell."""
 HAND_MARGIN = 2
 """[px] of the full image around the hand that count neither as garment nor as background."""
+LEAST = 8.0
+"""Distance of colours (0 to 255) up to which they are alike."""
+SHADE = (0.2, 0.95)
+"""Shares of the light that a shadow leaves."""
+OF_ITS_TINT = 0.7
+"""Share of what differs that is darker background from which on this is the garment, and not its shadow."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +150,8 @@ def hold_masks(
 def hold_mask(image: np.ndarray, background: np.ndarray, camera: Camera, hand: np.ndarray) -> np.ndarray:
     """Return (h, w) bool, the garment in an image: what differs from the image without it, in the hand's region.
 
-    The limit between like and unlike is Otsu's.
+    The limit between like and unlike is Otsu's. What has the background's tint and less light is the garment's shadow,
+    unless most of what differs is so: then the garment has that tint.
 
     Args:
         image: (h, w, 3) uint8 RGB.
@@ -157,12 +164,14 @@ def hold_mask(image: np.ndarray, background: np.ndarray, camera: Camera, hand: n
     """
     import cv2
 
-    apart = np.linalg.norm(
-        cv2.GaussianBlur(image, (0, 0), 1.0).astype(float) - cv2.GaussianBlur(background, (0, 0), 1.0).astype(float),
-        axis=2,
-    )
+    smooth, behind = (cv2.GaussianBlur(each, (0, 0), 1.0).astype(float) for each in (image, background))
+    apart = np.linalg.norm(smooth - behind, axis=2)
     limit, _ = cv2.threshold(np.minimum(apart, 255).astype(np.uint8), 0, 255, cv2.THRESH_OTSU)
-    found = cv2.morphologyEx((apart > max(limit, 8.0)).astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    differs = apart > max(limit, LEAST)
+    shaded = differs & _is_shaded(smooth, behind)
+    if shaded.sum() < OF_ITS_TINT * differs.sum():
+        differs &= ~shaded
+    found = cv2.morphologyEx(differs.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
     number, labels = cv2.connectedComponents(found, connectivity=8)
     if number < 2:
         raise ImageError("the image is like its background: no garment is seen")
@@ -170,3 +179,10 @@ def hold_mask(image: np.ndarray, background: np.ndarray, camera: Camera, hand: n
     u, v = camera.project(hand)
     near = np.hypot(columns - u, rows - v).argmin()
     return np.asarray(labels == labels[rows[near], columns[near]])
+
+
+def _is_shaded(image: np.ndarray, background: np.ndarray) -> np.ndarray:
+    """Return (h, w) bool, where an image (h, w, 3) shows the background's colours in less light."""
+    light = (image * background).sum(axis=2) / np.maximum((background**2).sum(axis=2), 1.0)
+    apart = np.linalg.norm(image - np.clip(light, *SHADE)[..., None] * background, axis=2)
+    return np.asarray(apart < LEAST)
