@@ -114,3 +114,22 @@ def test_each_frame_reads():
 
     world.run(0.1, each_frame=look)
     assert len(set(seen)) == 6 and world.time == pytest.approx(0.1)
+
+
+def test_a_push_that_ends_within_a_frame_moves_no_frame():
+    """A span is its frames, to the bit, also behind the end of a push, and frames are told where they end."""
+    ways = []
+    for pieces in (1, 6):
+        world = falling()
+        world.run(0.013)
+        body = world.find("cube")
+        world.push(body, (0.3, 0.0, 0.0), duration=0.03)
+        batch, times = world.imagine(2), []
+        for _ in range(pieces):
+            world.run(6.0 / pieces / 60.0, each_frame=times.append if pieces == 1 else None)
+            batch.run(6.0 / pieces / 60.0)
+        if pieces == 1:
+            np.testing.assert_allclose(times, 0.013 + np.arange(1, 7) / 60.0, atol=1e-9)
+        ways.append((body.vertices, batch.find(body.name).vertices[1]))
+    for own in (ways[0][1], *ways[1]):
+        np.testing.assert_array_equal(own, ways[0][0])

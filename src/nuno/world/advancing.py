@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import cached_property
 from typing import Any
@@ -78,10 +79,12 @@ class Advancing(Simulation):
     ) -> bool:  # fmt: skip
         """Advance all bodies to ``finish`` [s]; return whether no list was too short: else all are longer now."""
         start = now = self._time
-        ends = sorted({p.end for d in moving.values() for p in d.pushes if p.end is not None})
-        # of instants that rounding alone keeps apart one
-        ends = [t for k, t in enumerate(ends) if k == 0 or t > ends[k - 1] + SOON]
-        stops = [*(t for t in ends if start + SOON < t < finish - SOON), finish]
+        frame = 1.0 / self.frame_rate
+        ends = [p.end for d in moving.values() for p in d.pushes if p.end is not None and start < p.end < finish]
+        # frames after a push go on as if there had been none, as they do where the span is gone through in pieces
+        whole = [start + frame * math.ceil((end - start - SOON) / frame) for end in ends]
+        stops = _apart([*ends, *whole], start, finish)
+        asked = np.asarray(_frame_ends(start, finish, frame) if instants is None else instants)
         for body, dynamics in moving.items():
             if isinstance(dynamics, ParticleDynamics):
                 dynamics.set_self_contact(self._rules.touches_itself(body))
@@ -90,7 +93,7 @@ class Advancing(Simulation):
                 self._schedule_kinematic(now, stop - now)
             if look is None:
                 self._stepping.run(now, stop)
-            elif not self._run_looking(now, stop, look, instants, moving if careful else None):
+            elif not self._run_looking(now, stop, look, asked, moving if careful else None):
                 return False
             now = stop
         rigid: dict[Body, Any] = {body: dynamics for body, dynamics in moving.items() if dynamics.is_rigid}
@@ -123,11 +126,11 @@ class Advancing(Simulation):
             True: nothing must be repeated, as there are no lists.
         """
         start, frame = self._time, 1.0 / self.frame_rate
-        ends = start + frame * np.arange(1, int((finish - start) / frame + 1e-6) + 1)
-        asked = ends if instants is None else np.asarray(instants)
+        ends = _frame_ends(start, finish, frame)
+        asked = np.asarray(ends if instants is None else instants)
         pushes = [p.end for dynamics in self._attached() for p in dynamics.pushes if p.end is not None]
         now = start
-        for stop in _apart([*ends.tolist(), *pushes, *asked.tolist()], start, finish):
+        for stop in _apart([*ends, *pushes, *asked.tolist()], start, finish):
             kinematic, self._rests = self._kinematic_bodies(), False
             self._schedule = make_schedule(kinematic, now, stop - now, frame) if kinematic else None
             self._engine.schedule = self._schedule
@@ -137,7 +140,7 @@ class Advancing(Simulation):
                 worlds = tuple(np.flatnonzero(~self._engine.finite(broken[0])).tolist())
                 raise SimulationDiverged(broken[0].name, start, worlds)
             now = stop
-            due = np.abs(asked - stop).min(initial=np.inf) < SOON or (instants is None and stop == finish)
+            due = np.abs(asked - stop).min(initial=np.inf) < SOON
             if look is not None and due and stop > self._reported + SOON:
                 self._telling = True
                 try:
@@ -160,7 +163,7 @@ class Advancing(Simulation):
         return any([own.make_room(body) for body, own in moving.items() if isinstance(own, ParticleDynamics)])
 
     def _run_looking(
-        self, time: float, stop: float, look: Callable[[float], None], instants: np.ndarray | None,
+        self, time: float, stop: float, look: Callable[[float], None], instants: np.ndarray,
         careful: dict[Body, Dynamics] | None,
     ) -> bool:  # fmt: skip
         """Advance from ``time`` to ``stop`` [s] from one of ``instants`` to the next, telling the time at each.
@@ -169,13 +172,7 @@ class Advancing(Simulation):
             Whether nothing must be repeated, as far as this was looked at: of ``careful``, all that moves, before each
             instant.
         """
-        if instants is None:
-            frame = 1.0 / self.frame_rate
-            ends = time + frame * np.arange(1, int((stop - time) / frame + 1e-6) + 1)
-            if not len(ends) or stop - ends[-1] > SOON:
-                ends = np.append(ends, stop)
-        else:
-            ends = instants[(instants > time + SOON) & (instants < stop + SOON)]
+        ends = instants[(instants > time + SOON) & (instants < stop + SOON)]
         now = time
         for end in ends.tolist():
             self._stepping.run(now, end)
@@ -192,6 +189,11 @@ class Advancing(Simulation):
         if stop - now > SOON:
             self._stepping.run(now, stop)
         return True
+
+
+def _frame_ends(start: float, finish: float, frame: float) -> list[float]:
+    """Return the instants after ``start`` [s] at which frames end, ``finish`` the last of them."""
+    return _apart([start + frame * k for k in range(1, int((finish - start) / frame) + 2)], start, finish)
 
 
 def _apart(stops: list[float], start: float, finish: float) -> list[float]:
