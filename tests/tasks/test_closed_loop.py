@@ -260,7 +260,7 @@ class WrongPickError(AssertionError):
 
 
 def tried(pick, material):
-    """A pick of a towel; one comes out wrong, with the truth among the first three (docs/closed-loop.md)."""
+    """A pick of a towel; one comes out wrong, behind the hand, and in doubt (docs/reports/tasks.md)."""
     wrong = pick == (3, 3) and material == "interlock"
     mark = pytest.mark.xfail(strict=True, raises=WrongPickError, reason="a neighbour is said")
     return pytest.param(pick, material, marks=mark if wrong else ())
@@ -276,6 +276,6 @@ def test_all_picks(pick, material):
     border = Border(room)
     talos, answer = play(border, pick)
     assert tuple(np.rint(true_pick(talos, room)).astype(int)) == pick, "the hand went elsewhere"
-    assert pick in [tuple(place[:2]) for place in answer.result.ranking[:3]]
     if answer.pick != pick:
+        assert answer.result.confidence < 0.5 and answer.result.warnings
         raise WrongPickError(f"{answer.pick} is said instead of {pick}, at {answer.result.confidence:.2f}")
