@@ -262,7 +262,7 @@ class WrongPickError(AssertionError):
 def tried(pick, material):
     """A pick of a towel; one comes out wrong, behind the hand, and in doubt (docs/reports/tasks.md)."""
     wrong = pick == (3, 3) and material == "interlock"
-    mark = pytest.mark.xfail(strict=True, raises=WrongPickError, reason="a neighbour is said")
+    mark = pytest.mark.xfail(strict=True, raises=WrongPickError, reason="another point is said")
     return pytest.param(pick, material, marks=mark if wrong else ())
 
 
