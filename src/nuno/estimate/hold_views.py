@@ -35,7 +35,7 @@ MARGIN = 3
 """[px] around a garment's vertices, which is drawn thicker than they tell."""
 HAND_MARGIN = 2
 """[px] of the full image around the hand that count neither as garment nor as background."""
-LEAST = 8.0
+ALIKE = 8.0
 """Distance of colours (0 to 255) up to which they are alike."""
 SHADE = (0.2, 0.95)
 """Shares of the light that a shadow leaves."""
@@ -167,7 +167,7 @@ def hold_mask(image: np.ndarray, background: np.ndarray, camera: Camera, hand: n
     smooth, behind = (cv2.GaussianBlur(each, (0, 0), 1.0).astype(float) for each in (image, background))
     apart = np.linalg.norm(smooth - behind, axis=2)
     limit, _ = cv2.threshold(np.minimum(apart, 255).astype(np.uint8), 0, 255, cv2.THRESH_OTSU)
-    differs = apart > max(limit, LEAST)
+    differs = apart > max(limit, ALIKE)
     shaded = differs & _is_shaded(smooth, behind)
     if shaded.sum() < OF_ITS_TINT * differs.sum():
         differs &= ~shaded
@@ -185,4 +185,4 @@ def _is_shaded(image: np.ndarray, background: np.ndarray) -> np.ndarray:
     """Return (h, w) bool, where an image (h, w, 3) shows the background's colours in less light."""
     light = (image * background).sum(axis=2) / np.maximum((background**2).sum(axis=2), 1.0)
     apart = np.linalg.norm(image - np.clip(light, *SHADE)[..., None] * background, axis=2)
-    return np.asarray(apart < LEAST)
+    return np.asarray(apart < ALIKE)
