@@ -90,3 +90,30 @@ def height(body):
 
 PEAK = 10.0 / np.sqrt(3.0) * 0.5
 """[m/s2] Of a lift by 0.5 m in 1 s."""
+
+
+def assert_same(found, expected):
+    """Nothing differs in a bit."""
+    assert [name for name, own in expected.items() if not np.array_equal(found[name], own)] == []
+
+
+def assert_all_become(world, spans, expected, alone, states_of):
+    """A world, a copy of it and the world restored are as expected, once each has run through spans [s].
+
+    Args:
+        world: With a robot.
+        spans: One run each.
+        expected: What they become, by name.
+        alone: (world, robot) -> what there is to see of a world.
+        states_of: (futures) -> the same of each world of a batch.
+    """
+    kept, copies = world.save(), world.imagine(1)
+    for own in (world, copies):
+        for span in spans:
+            own.run(span)
+    assert_same(alone(world, world.robot), expected)
+    assert_same(states_of(copies)[0], expected)
+    world.restore(kept)
+    for span in spans:
+        world.run(span)
+    assert_same(alone(world, world.robot), expected)

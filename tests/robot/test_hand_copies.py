@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from lifter import lifter_in
+from lifter import assert_all_become, assert_same, lifter_in
 
 import nuno
 from nuno.errors import BodyStateError
@@ -59,11 +59,6 @@ def alone(world, robot):
     found |= {body.name: body.vertices for body in world.bodies}
     found["held"] = {body.name for body in robot.hands[HAND].held}
     return found | {"goal": None if goal is None else (goal.status, goal.holds)}
-
-
-def assert_same(found, expected):
-    """Nothing differs in a bit."""
-    assert [name for name, own in expected.items() if not np.array_equal(found[name], own)] == []
 
 
 def begin(scene):
@@ -218,16 +213,7 @@ def test_commands_of_a_future_include_its_hands(scene):
         told = robot.grippers[HAND].goal
         world.adopt(futures, k, only="commands")
         assert told.status == GoalStatus.PREEMPTED
-        kept, copies = world.save(), world.imagine(1)
-        for own in (world, copies):
-            for span in spans:
-                own.run(span)
-        assert_same(alone(world, robot), ends[k])
-        assert_same(states_of(copies)[0], ends[k])
-        world.restore(kept)
-        for span in spans:
-            world.run(span)
-        assert_same(alone(world, robot), ends[k])
+        assert_all_become(world, spans, ends[k], alone, states_of)
         assert "cube" in ends[k]["held"]
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from lifter import lifter_in
+from lifter import assert_all_become, assert_same, lifter_in
 
 import nuno
 from nuno.errors import InvalidInputError, UnknownNameError
@@ -57,11 +57,6 @@ def states_of(futures):
 def alone(world, robot):
     """The same of the robot's own world."""
     return state_of(world, robot.state()) | {"wrist": np.concatenate(robot.read_wrench("right_wrist"))}
-
-
-def assert_same(found, expected):
-    """Nothing differs in a bit."""
-    assert [name for name, own in expected.items() if not np.array_equal(found[name], own)] == []
 
 
 def names_of(held, k):
@@ -222,16 +217,7 @@ def test_commands_of_a_future_include_its_hands(scene):
     for k in range(2):
         world.restore(saved)
         world.adopt(futures, k, only="commands")
-        kept, copies = world.save(), world.imagine(1)
-        for own in (world, copies):
-            for span in spans:
-                own.run(span)
-        assert_same(alone(world, robot), ends[k])
-        assert_same(states_of(copies)[0], ends[k])
-        world.restore(kept)
-        for span in spans:
-            world.run(span)
-        assert_same(alone(world, robot), ends[k])
+        assert_all_become(world, spans, ends[k], alone, states_of)
         assert [body.name for body in robot.hands[HAND].held] == [[], ["towel", "cube"]][k]
     world.restore(saved)
     world.adopt(futures, 0, only="commands")

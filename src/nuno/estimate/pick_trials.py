@@ -13,7 +13,7 @@ from nuno.camera.cloth_outline import ClothOutline
 from nuno.camera.rectangle import ClothRectangle
 from nuno.errors import EstimationError
 from nuno.estimate import between_candidates
-from nuno.estimate.between_candidates import cells_of
+from nuno.estimate.between_candidates import Cells, cells_of
 from nuno.estimate.coming_to_rest import groups
 from nuno.estimate.doubt import FAIRLY, doubted, misfit, oddities
 from nuno.estimate.futures import Futures, imagine_picks
@@ -106,11 +106,19 @@ def try_picks(
         hand_path=settings.hand_path,
     )  # fmt: skip
     prior = _prior(settings, rectangle)
-    judge = _judge_between(settings, rectangle, prior)
-    usually_sure = SURE if judge is None else between_candidates.SURE
+    cells = _cells(settings, rectangle)
+    usually_sure = SURE if cells is None else between_candidates.SURE
     sure = usually_sure if settings.sure is None else settings.sure
     comparisons: list[Comparison] = []
     reflected: list[list[Comparison]] = []
+
+    def likely(warnings: Sequence[str] = ()) -> Ranked:
+        """How likely each candidate is the nearest to the pick, by all comparisons."""
+        found, count = _all(comparisons, reflected), len(uv)
+        if cells is None:
+            return doubted(found, settings.score, count, prior, warnings)
+        return cells.nearest(doubted(found, settings.score, count, prior, warnings, between_candidates.TEMPERATURE))
+
     batches: list[Futures] = []
     ranked: Ranked | None = None
     outline: Outline | None = None
@@ -170,41 +178,28 @@ def try_picks(
         ranked = doubted(_all(comparisons, reflected), settings.score, len(uv), prior)
         stages.end("compare")
         may_end = discretisation.self_contact and (k > 0 or hand_is == 0)
-        if may_end and (ranked if judge is None else judge(comparisons, ())).settled(sure):
+        if may_end and (ranked if cells is None else likely()).settled(sure):
             break
     assert ranked is not None
     if not np.isfinite(ranked.scores).any():
         raise EstimationError("no imagined pick stayed finite; smaller steps or softer guesses are needed")
-    best = int((ranked if judge is None else judge(comparisons, ())).order[0])
+    best = int(ranked.order[0])
     batch, world, _ = PickTrials(comparisons, batches, ranked, seen).best_match(best, settings.score)
     guess = meshes[batch].hypotheses[world // len(comparisons[batch].candidates)]
     odd = oddities(comparisons, best, settings.score, guess, seen=hand_is != 0)
     reported = (*rectangle.warnings, *seen.warnings, *odd)
     if hand_is != 0 and guess.mistake != 0.0:  # what was seen of the hand is explained, and told once
         reported = tuple(warning for warning in reported if not warning.startswith((AWAY, COVERED)))
-    if judge is None:
-        ranked = doubted(_all(comparisons, reflected), settings.score, len(uv), prior, reported)
-    else:
-        ranked = judge(comparisons, reported)
-    trusted = 1.0 if ranked.likely is None else float(ranked.likely[int(ranked.order[0])])
+    ranked = likely(reported)
+    trusted = 1.0 if ranked.likely is None else float(ranked.likely[best])
     return PickTrials(comparisons, batches, ranked, seen, odd, trusted, reflected)
 
 
-def _judge_between(
-    settings: PickSettings, rectangle: ClothRectangle, prior: np.ndarray
-) -> Callable[[list[Comparison], Sequence[str]], Ranked] | None:
-    """Return what ranks candidates that are spread over an outline, by comparisons and warnings; None of others."""
+def _cells(settings: PickSettings, rectangle: ClothRectangle) -> Cells | None:
+    """Return what lies between candidates that are spread over an outline, where evidence ranks; None of others."""
     if settings.spacing is None or not settings.with_evidence or not isinstance(rectangle, ClothOutline):
         return None
-    cells = cells_of(rectangle.polygon, settings.labels, settings.spacing)
-
-    def judge(comparisons: list[Comparison], warnings: Sequence[str]) -> Ranked:
-        temperature = between_candidates.TEMPERATURE
-        return cells.nearest(
-            doubted(comparisons, settings.score, len(settings.uv), prior, warnings, temperature=temperature)
-        )
-
-    return judge
+    return cells_of(rectangle.polygon, settings.labels, settings.spacing)
 
 
 def in_fewer_groups(chosen: np.ndarray, ranked: Ranked, discretisation: Discretisation) -> np.ndarray:

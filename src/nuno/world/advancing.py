@@ -84,16 +84,17 @@ class Advancing(Simulation):
         # frames after a push go on as if there had been none, as they do where the span is gone through in pieces
         whole = [start + frame * math.ceil((end - start - SOON) / frame) for end in ends]
         stops = _apart([*ends, *whole], start, finish)
-        asked = np.asarray(_frame_ends(start, finish, frame) if instants is None else instants)
+        if look is not None and instants is None:
+            instants = np.asarray(_frame_ends(start, finish, frame))
         for body, dynamics in moving.items():
             if isinstance(dynamics, ParticleDynamics):
                 dynamics.set_self_contact(self._rules.touches_itself(body))
         for stop in stops:
             if moving:
                 self._schedule_kinematic(now, stop - now)
-            if look is None:
+            if look is None or instants is None:
                 self._stepping.run(now, stop)
-            elif not self._run_looking(now, stop, look, asked, moving if careful else None):
+            elif not self._run_looking(now, stop, look, instants, moving if careful else None):
                 return False
             now = stop
         rigid: dict[Body, Any] = {body: dynamics for body, dynamics in moving.items() if dynamics.is_rigid}
