@@ -113,7 +113,7 @@ def try_picks(
     reflected: list[list[Comparison]] = []
 
     def likely(warnings: Sequence[str] = ()) -> Ranked:
-        """How likely each candidate is the nearest to the pick, by all comparisons."""
+        """Return how likely each candidate is the nearest to the pick, by all comparisons."""
         found, count = _all(comparisons, reflected), len(uv)
         if cells is None:
             return doubted(found, settings.score, count, prior, warnings)
