@@ -32,7 +32,11 @@ def _again(name):
 
 @pytest.fixture
 def functions_apart():
-    """Keep Nuno's functions out of line; Warp names what is made of them by another hash than what is launched."""
+    """Keep Nuno's functions out of line; Warp names what is made of them by another hash than what is launched.
+
+    A test that ran one of Nuno's commands in this process has frozen what was there, which `gc.get_objects` leaves out.
+    """
+    gc.unfreeze()
     found = [each for each in gc.get_objects() if isinstance(each, wp.Function)]
     apart = [
         each
