@@ -248,7 +248,7 @@ def test_nothing_is_near():
     assert world.contacts(body).impulses == {}
 
 
-@pytest.mark.parametrize("build", [pytest.param(scenes, marks=pytest.mark.long), thrown])
+@pytest.mark.parametrize("build", [pytest.param(scenes, marks=pytest.mark.slow), thrown])
 def test_copies_sum_up_too(build, tmp_path):
     """Futures, restored worlds and files tell, after a frame, what the world does, to the bit; and nothing before."""
     world = nuno.World(device="cpu")

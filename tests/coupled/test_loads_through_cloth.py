@@ -357,7 +357,7 @@ def test_a_book_on_a_folded_towel(layers):
     ("where", "shape"),
     [
         ("cpu", "square"),
-        ("at once", "square"),
+        pytest.param("at once", "square", marks=pytest.mark.slow),
         pytest.param("cpu", "round", marks=pytest.mark.slow),  # square ones crept more, and take less
         pytest.param("at once", "round", marks=pytest.mark.slow),
         pytest.param("cuda:0", "square", marks=pytest.mark.cuda),

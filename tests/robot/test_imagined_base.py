@@ -276,10 +276,10 @@ def test_commands_of_a_future_include_its_walks(scene):
             world.run(span)
         assert_same(state_of(world, robot.state()), ends[1])
         world.restore(kept)
-        copies = world.imagine(1)  # and in copies that were imagined before they began
-        for span in spans:
-            copies.run(span)
-        assert_same(states_of(copies)[0], ends[1])
+    copies = world.imagine(1)  # and in copies that were imagined before they began
+    for span in spans:
+        copies.run(span)
+    assert_same(states_of(copies)[0], ends[1])
     robot.go_stop(force_stop=False)  # what the robot is told is told in place of what was to come
     assert not robot.gait.awaits
 

@@ -151,15 +151,15 @@ def test_viewing_changes_no_bit(monkeypatch):
 
 @pytest.mark.parametrize("real_time_factor", [1.0, math.inf])
 def test_a_world_in_the_background_is_followed(real_time_factor):
-    """Also one that makes frames as fast as it can, without pause."""
+    """Also one that makes frames as fast as it can, without pause; a page may hear twice of one time, never go back."""
     world = make_world()
     with Viewer(world) as viewer:
         feed = Feed(viewer)
         world.start(real_time_factor)
         clocks = lambda: [command["time"] for command in feed.commands if command["do"] == "clock"]  # noqa: E731
-        feed.wait_for(lambda: len(clocks()) > 5)
+        feed.wait_for(lambda: len(set(clocks())) > 5)
         world.stop()
-        assert np.all(np.diff(clocks()) > 0.0)
+        assert np.all(np.diff(clocks()) >= 0.0)
 
 
 def test_a_stepped_world_is_followed():
