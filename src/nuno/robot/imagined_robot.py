@@ -371,4 +371,5 @@ class ImaginedRobot(ImaginedBase, ImaginedHands):
         return all(body._world is self.world for body in self._links)
 
     def _serve(self, before: RobotState, others: Any, base: Any, span: float) -> tuple[np.ndarray, Any]:
+        self._servo.take_gravity(self.world.gravity)
         return self._servo.rows, self._servo.step(before, others, base, span, None)

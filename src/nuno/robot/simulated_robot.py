@@ -375,4 +375,5 @@ class SimulatedRobot(SimulatedBase):
 
     def _serve(self, before: RobotState, others: Any, base: Any, span: float) -> tuple[np.ndarray, Any]:
         assert self._servo is not None
+        self._servo.take_gravity(self.world.gravity)
         return self._servo.rows, self._servo.step(before, others, base, span, self._external())
