@@ -144,7 +144,7 @@ class Balance:
         return found
 
     def _falling(self) -> Stabiliser | None:
-        """Return what keeps the robot up in the gravity that its world has now; None without feet, or where it floats."""
+        """Return what keeps the robot up in the gravity of now; None without feet, or where it floats."""
         gravity = self.dynamics.world.gravity
         self._control.take_gravity(gravity)
         if self._stabiliser is None or not any(gravity):

@@ -100,7 +100,7 @@ class Sensors:
         self.ground = number("ground", ground)
         self._model = robot.model.copy()
         self._world = None if links is None else links.world
-        self._firmly = self._least_contact()
+        self._firmly = self._contact_force()
         self._data = self._model.createData()
         self._shapes = ((self._model.nq,), (self._model.nv,), (self._model.nv,))
         self._external = pin.StdVec_Force()
@@ -183,10 +183,10 @@ class Sensors:
         """Reckon with the gravity that the world has now; return whether it was another before."""
         changed = self._world is not None and take_gravity(self._model, self._world.gravity)
         if changed:
-            self._firmly = self._least_contact()
+            self._firmly = self._contact_force()
         return changed
 
-    def _least_contact(self) -> float:
+    def _contact_force(self) -> float:
         """Return with what force [N] a foot presses at least that has contact."""
         return CONTACT * self.robot.mass * float(np.linalg.norm(self._model.gravity.linear))
 
