@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 PROBES = 5
 """Points along each side of the closing volume from which the nearest surface is looked for."""
 TOUCHES = 2e-3
-"""[m] Less than the width of the fingers, from where on a body between them touches both: shapes are so much smaller."""
+"""[m] By how much a body may be narrower than the fingers are apart that touches both: shapes are so much smaller."""
 FINGERS = CLOSING
 """The axis of a hand's frame along which its fingers close."""
 

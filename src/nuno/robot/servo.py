@@ -168,12 +168,11 @@ class Servo:
         return np.asarray(dgesv(matrix, right)[2])
 
 
-def external_forces(links: Links, loads: Sequence[Load]) -> Any:
-    """Return what loads do to each joint, in the joints' own frames where the robot is now."""
+def external_forces(links: Links, loads: Sequence[Load], placements: Any) -> Any:
+    """Return what loads do to each joint, in the joints' own frames, which have Pinocchio's placements."""
     found = pin.StdVec_Force()
     for _ in range(links.robot.model.njoints):
         found.append(pin.Force.Zero())
-    placements = links.robot.update().oMi
     for load in loads:
         joint = links.joints[load.link]
         torque = load.torque + np.cross(load.point, load.force)
