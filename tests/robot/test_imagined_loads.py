@@ -29,7 +29,7 @@ def room(tmp_path):
 
 
 def test_copies_sag_by_what_they_carry(room):
-    """m g / k, as the robot's own slide does; where a copy lets go, by the palm's weight alone."""
+    """By m g / k, as the robot's own slide does; where a copy lets go, by the palm's weight alone."""
     world, robot = room
     futures = world.imagine(2)
     futures.robot.stop_grasp("rarm", worlds=1)
@@ -54,6 +54,6 @@ def test_copies_feel_it_on_the_way(room):
         futures.step()
         heights.append((robot.actual.angle_vector()[row], futures.robot.angle_vector()[0, row]))
     own, imagined = np.transpose(heights)
-    # without the cube's weight for a frame, 1.5 kg come to g t m / M = 0.05 m/s, which the law's damping stops within 2 mm
+    # without the cube's weight for a frame, 1.5 kg come to g t m / M = 0.05 m/s, which the law damps within 2 mm
     np.testing.assert_allclose(imagined, own, atol=3e-3)
     assert np.ptp(own) > 0.05
