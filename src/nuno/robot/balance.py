@@ -84,7 +84,11 @@ class Balance:
         rates = np.array([own.v[6:] for own in wanted])
         values = [angles, rates, *(np.tile(own, (worlds, 1)) for own in (dynamics.stiffness, dynamics.damping))]
         values.append(np.zeros(angles.shape))
-        standing = [w for w, own in enumerate(now) if own.fallen is None]
+        hangs = dynamics.hangs()  # by a hoist, say: it has nothing to stand on, and what holds it bears its weight
+        standing = [
+            w for w, own in enumerate(now)
+            if own.fallen is None and not (hangs[w] and own.contacts.keys().isdisjoint(self._foot_links))
+        ]  # fmt: skip
         if self.is_on and stabiliser is not None and standing:
             states = [now[w] for w in standing]
             motion = stabiliser.actual([own.q for own in states], [own.v for own in states])

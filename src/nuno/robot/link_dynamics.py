@@ -315,6 +315,15 @@ class LinkDynamics:
                 self._add(found[w], k, w, middle[min(w, len(middle) - 1)], push, np.zeros(3))
         return list(found)
 
+    def hangs(self) -> np.ndarray:
+        """Return where something else than the robot's own joints holds a link of it, (worlds,) bool."""
+        own, worlds = {*self.joints, *self.fingers.joints}, self.world.world_count
+        found = np.zeros(worlds, dtype=bool)
+        for grip in grips_of(self.bodies):
+            if grip not in own:
+                found |= holding(grip.spec, worlds)
+        return found
+
     def _add(self, loads: np.ndarray, k: int, world: int, point: Any, force: np.ndarray, torque: np.ndarray) -> None:
         """Add a force [N] at a point [m] and a torque [N m] on link ``k`` to the loads (joints, 6) of a world."""
         joint = self.links.joints[k]
