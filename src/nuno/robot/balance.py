@@ -84,7 +84,7 @@ class Balance:
         rates = np.array([own.v[6:] for own in wanted])
         values = [angles, rates, *(np.tile(own, (worlds, 1)) for own in (dynamics.stiffness, dynamics.damping))]
         values.append(np.zeros(angles.shape))
-        hangs = dynamics.hangs()  # by a hoist, say: it has nothing to stand on, and what holds it bears its weight
+        hangs = dynamics.hangs(worlds)  # by a hoist, say, which bears its weight: it has nothing to stand on
         standing = [
             w for w, own in enumerate(now)
             if own.fallen is None and not (hangs[w] and own.contacts.keys().isdisjoint(self._foot_links))

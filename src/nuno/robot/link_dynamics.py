@@ -315,9 +315,9 @@ class LinkDynamics:
                 self._add(found[w], k, w, middle[min(w, len(middle) - 1)], push, np.zeros(3))
         return list(found)
 
-    def hangs(self) -> np.ndarray:
-        """Return where something else than the robot's own joints holds a link of it, (worlds,) bool."""
-        own, worlds = {*self.joints, *self.fingers.joints}, self.world.world_count
+    def hangs(self, worlds: int) -> np.ndarray:
+        """Return in which of so many worlds something else than its own joints holds a link, (worlds,) bool."""
+        own = {*self.joints, *self.fingers.joints}
         found = np.zeros(worlds, dtype=bool)
         for grip in grips_of(self.bodies):
             if grip not in own:
