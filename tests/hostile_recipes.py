@@ -560,6 +560,7 @@ UNCALLED = {
         "SimulatedRobot.take_future",
         "SimulatedRobot.future_commands",
         "SimulatedRobot.follow_grips",
+        "Hand.hold_on",
         "Hand.take_grips",
         "Joint.spec_for",
         "Path.keys_around",

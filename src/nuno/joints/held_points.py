@@ -12,6 +12,7 @@ from nuno.joints.grip import GripSpec
 from nuno.joints.joint import JointSpec
 from nuno.joints.tie import HoldSpec, corners_of
 from nuno.shapes.coordinates import compose
+from nuno.shapes.surface import SurfacePoints
 
 if TYPE_CHECKING:
     from nuno.joints.grip import Grip
@@ -52,6 +53,19 @@ def released(spec: Any, worlds: np.ndarray) -> Any:
     values = np.array(getattr(spec, name))
     values[worlds] = -1
     return replace(spec, **{name: values})
+
+
+def places_on_body(grip: Grip) -> np.ndarray | SurfacePoints | None:
+    """Return where on its body a grip of one world holds it, as ``World.grip`` takes that; None of a rigid body."""
+    if isinstance(grip.spec, HoldSpec):
+        return None
+    corners, weights = (own[0] for own in corners_of(grip.spec))
+    there = corners[:, 0] >= 0
+    corners, weights = corners[there], weights[there]
+    if (corners[:, 1] < 0).all():
+        return np.array(corners[:, 0])
+    faces = [int(np.flatnonzero((grip.body.faces == own).all(axis=1))[0]) for own in corners]
+    return SurfacePoints(np.array(faces), weights)
 
 
 def held_points(grip: Grip, index: int = 0, vertices: np.ndarray | None = None) -> np.ndarray:

@@ -58,7 +58,7 @@ class Balance:
     def __init__(self, links: Links, *, friction: float = 0.8, gains: Gains | None = None) -> None:
         robot = links.robot
         self.dynamics = LinkDynamics(links, friction=friction)
-        self._robot, self._world = robot, links.world
+        self._robot = robot
         feet = [robot.frame_index(foot) for foot in robot.description.feet]
         joints = [robot.model.frames[foot].parentJoint for foot in feet]
         self._foot_links = [links.names[links.joints.index(joint)] for joint in joints]
@@ -79,12 +79,16 @@ class Balance:
             span: [s] of the frame.
             servo: A torque law that some joints are under, or None.
         """
-        dynamics, worlds, stabiliser = self.dynamics, len(now), self._stabiliser
+        dynamics, worlds, stabiliser = self.dynamics, len(now), self._falling()
         angles = self._robot.angles_of(np.array([own.q for own in wanted]))
         rates = np.array([own.v[6:] for own in wanted])
         values = [angles, rates, *(np.tile(own, (worlds, 1)) for own in (dynamics.stiffness, dynamics.damping))]
         values.append(np.zeros(angles.shape))
-        standing = [w for w, own in enumerate(now) if own.fallen is None]
+        hangs = dynamics.hangs(worlds)  # by a hoist, say, which bears its weight: it has nothing to stand on
+        standing = [
+            w for w, own in enumerate(now)
+            if own.fallen is None and not (hangs[w] and own.contacts.keys().isdisjoint(self._foot_links))
+        ]  # fmt: skip
         if self.is_on and stabiliser is not None and standing:
             states = [now[w] for w in standing]
             motion = stabiliser.actual([own.q for own in states], [own.v for own in states])
@@ -117,7 +121,7 @@ class Balance:
             time: [s].
         """
         q, v, torques, contacts, wrenches, loads = ([*own] for own in zip(*ended, strict=True))
-        fallen, stabiliser = [own.fallen for own in before], self._stabiliser
+        fallen, stabiliser = [own.fallen for own in before], self._falling()
         footings: list[Footing | None] = [None] * len(before)
         standing = [w for w, why in enumerate(fallen) if why is None and stabiliser is not None]
         if stabiliser is not None and standing:
@@ -142,6 +146,15 @@ class Balance:
                 contacts=contacts[w], joint_wrenches=wrenches[w], footing=footings[w],
             ))  # fmt: skip
         return found
+
+    def _falling(self) -> Stabiliser | None:
+        """Return what keeps the robot up in the gravity of now; None without feet, or where it floats."""
+        gravity = self.dynamics.world.gravity
+        self._control.take_gravity(gravity)
+        if self._stabiliser is None or not any(gravity):
+            return None
+        self._stabiliser.take_gravity(gravity)
+        return self._stabiliser
 
     def _why_fallen(self, q: np.ndarray, wanted: np.ndarray, ground: float, time: float) -> str | None:
         """Return why and when a robot that is at q (nq,) on a ground [m] fell, None where it did not; say it once."""
@@ -176,9 +189,9 @@ class Balance:
         return footings
 
     def load(self, state: RobotState) -> Carried | None:
-        """Return what a robot carries."""
-        gravity = float(np.linalg.norm(self._world.gravity))
-        return carried_by(self._robot, self._data, state.q, state.loads, gravity)
+        """Return what a robot carries; None where nothing weighs anything."""
+        gravity = float(np.linalg.norm(self.dynamics.world.gravity))
+        return carried_by(self._robot, self._data, state.q, state.loads, gravity) if gravity > 0.0 else None
 
     def ended(self, span: float) -> list[tuple[Any, Any, Any, Any, Any, Any]]:
         """Return q, v, torques, contacts, joint wrenches and loads after a frame of ``span`` [s], of each world.

@@ -44,7 +44,8 @@ class StrainSensors(Sensors):
         Args:
             state: How the robot moves, at the time that the world has now. Its arrays are never written to.
         """
-        loads, before = () if self._loads is None else self._loads.read(), self._unloaded
+        loads = () if self._loads is None else self._loads.read()
+        before = () if self._take_gravity() else self._unloaded
         motion = (state.q, state.v, state.a)
         if before and not loads and before[1] == self.ground and all(map(is_, before[0], motion)):
             torques, point = before[2]

@@ -11,6 +11,7 @@ from nuno.bodies.body import Body
 from nuno.dynamics.dynamics import dynamics_of
 from nuno.errors import InvalidInputError, UnknownNameError
 from nuno.joints.grip import Grip
+from nuno.joints.held_points import places_on_body
 from nuno.joints.joint import Joint
 from nuno.materials import Rigid
 from nuno.robot.closing_gap import closing_gap
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 
 PROBES = 5
 """Points along each side of the closing volume from which the nearest surface is looked for."""
+TOUCHES = 2e-3
+"""[m] By how much a body may be narrower than the fingers are apart that touches both: shapes are so much smaller."""
 FINGERS = CLOSING
 """The axis of a hand's frame along which its fingers close."""
 
@@ -86,7 +89,12 @@ class Hand:
     @property
     def presses(self) -> bool:
         """Return True if it holds by its fingers' friction alone, and grips nothing."""
-        return bool(self._fingers) and self.body.is_dynamic
+        return self.has_fingers and self.body.is_dynamic
+
+    @property
+    def has_fingers(self) -> bool:
+        """Return True if it has fingers that press, with dynamics."""
+        return bool(self._fingers)
 
     @property
     def width(self) -> float:
@@ -166,14 +174,22 @@ class Hand:
         limit = robot.effort_limits[robot.joint_index(joint)] * abs(own.closed - own.open) / max(own.width, 1e-9)
         force = min(force, float(limit) if limit > 0.0 else np.inf)
         with self._world.lock:
-            frame, found = self._frame(), 0.0
-            low, high = self.volume(self.width)
-            for body in self._others():
-                local = frame.to_local(self._vertices(body))
-                if not ((local.max(axis=0) < low).any() or (local.min(axis=0) > high).any()):
-                    faces, material = np.asarray(body.faces), self._material(body)
-                    found = max(found, closing_gap(faces, material, local, low, high, FINGERS, force))
-        return min(found, self.width)
+            frame = self._frame()
+            return min(max((self._gap_of(body, frame, force) for body in self._others()), default=0.0), self.width)
+
+    def _gap_of(self, body: Body, frame: Coordinates, force: float) -> float:
+        """Return how far apart [m] a body that is in the closing volume keeps fingers that press with a force [N]."""
+        low, high = self.volume(self.width)
+        local = frame.to_local(self._vertices(body))
+        if (local.max(axis=0) < low).any() or (local.min(axis=0) > high).any():
+            return 0.0
+        return float(closing_gap(np.asarray(body.faces), self._material(body), local, low, high, FINGERS, force))
+
+    def filled_by(self) -> list[Body]:
+        """Return the dynamic bodies that reach from one of its fingers to the other, as it is open now."""
+        with self._world.lock:
+            frame, width = self._frame(), self.width - TOUCHES
+            return [body for body in self._others() if self._gap_of(body, frame, np.inf) > width]
 
     def open(self) -> None:
         """Let go of everything: what was held moves on as if it had never been."""
@@ -184,6 +200,11 @@ class Hand:
     def take_grips(self, grips: Sequence[Grip]) -> None:
         """Hold with these grips from now on, and let go of nothing."""
         self._grips = list(grips)
+
+    def hold_on(self, grips: Sequence[Grip]) -> None:
+        """Hold at the same points what grips of this hand held that ended as its link lost its dynamics."""
+        for grip in grips:
+            self._take(grip.body, places_on_body(grip))
 
     def take_over(self) -> None:
         """Hold what is gripped to the hand's link, as a file has it that the world was restored from."""

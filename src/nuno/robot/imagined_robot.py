@@ -16,6 +16,7 @@ from nuno.errors import BodyStateError, InvalidInputError, RobotModelError
 from nuno.robot.goal import Goal
 from nuno.robot.imagined_base import ImaginedBase
 from nuno.robot.imagined_hands import ImaginedHands
+from nuno.robot.imagined_loads import ImaginedLoads
 from nuno.robot.imagined_sensors import ImaginedReadings, ImaginedSensors
 from nuno.robot.link_batch import LinkBatch
 from nuno.robot.motion_batch import MotionBatch
@@ -127,6 +128,7 @@ class ImaginedRobot(ImaginedBase, ImaginedHands):
             self._guards[k].load(found)
             own.gait.looks = self._guards[k].velocities_of(own)
         self._sensors: ImaginedSensors | None = None  # made when they are first read
+        self._loads: ImaginedLoads | None = None  # made when a servo command first asks for them
         self._make_hands(of, goals)
         closing = [name for name, own in original.grippers.items() if own.will_hold and name not in self.hands]
         if closing and of is None:
@@ -370,5 +372,11 @@ class ImaginedRobot(ImaginedBase, ImaginedHands):
         """Return True as long as no link was removed from the batch; without all of them the robot does nothing."""
         return all(body._world is self.world for body in self._links)
 
-    def _serve(self, before: RobotState, others: Any, base: Any, span: float) -> tuple[np.ndarray, Any]:
-        return self._servo.rows, self._servo.step(before, others, base, span, None)
+    def _serve(self, world: int, before: RobotState, others: Any, base: Any, span: float) -> tuple[np.ndarray, Any]:
+        if self._loads is None:
+            self._loads = ImaginedLoads(self.original.links, self.world, self._links)
+        if world == 0:
+            self._loads.renew()
+        self._servo.take_gravity(self.world.gravity)
+        external = self._loads.on_joints(world, before.q)
+        return self._servo.rows, self._servo.step(before, others, base, span, external)

@@ -63,7 +63,7 @@ class ImaginedSensors(Sensors):
 
     def __init__(self, robot: Humanoid, links: Links, world: World, bodies: Sequence[Body], ground: float) -> None:
         super().__init__(robot, links, ground=ground)
-        self._model.gravity.linear = np.array(world.gravity)
+        self._world = world
         self._reader, groups = WorldReader(world), self._groups()
         self._of_worlds = [
             LinkLoads(links, groups, reader=self._reader, bodies=bodies, index=k) for k in range(world.world_count)

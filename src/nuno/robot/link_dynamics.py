@@ -300,7 +300,7 @@ class LinkDynamics:
         """
         index = {body: k for k, body in enumerate(self.bodies)}
         others = [body for body in self.world.bodies if body not in index]
-        held = [(index[grip.target], grip) for grip in _grips_of(others) if grip.target in index]
+        held = [(index[grip.target], grip) for grip in grips_of(others) if grip.target in index]
         if not held and not any(pressing):
             return [None] * self.world.world_count
         found = np.zeros((self.world.world_count, self.robot.model.njoints, 6))
@@ -315,6 +315,15 @@ class LinkDynamics:
                 self._add(found[w], k, w, middle[min(w, len(middle) - 1)], push, np.zeros(3))
         return list(found)
 
+    def hangs(self, worlds: int) -> np.ndarray:
+        """Return in which of so many worlds something else than its own joints holds a link, (worlds,) bool."""
+        own = {*self.joints, *self.fingers.joints}
+        found = np.zeros(worlds, dtype=bool)
+        for grip in grips_of(self.bodies):
+            if grip not in own:
+                found |= holding(grip.spec, worlds)
+        return found
+
     def _add(self, loads: np.ndarray, k: int, world: int, point: Any, force: np.ndarray, torque: np.ndarray) -> None:
         """Add a force [N] at a point [m] and a torque [N m] on link ``k`` to the loads (joints, 6) of a world."""
         joint = self.links.joints[k]
@@ -328,7 +337,7 @@ class LinkDynamics:
         """Return the same for the copies of the links in a batch that was imagined from their world."""
         made = copy.copy(self)
         made.world, made.bodies = world, tuple(world.find(body.name) for body in self.bodies)
-        keys: dict[str, Any] = {grip.key: grip for grip in _grips_of(made.bodies)}
+        keys: dict[str, Any] = {grip.key: grip for grip in grips_of(made.bodies)}
         made.joints = tuple(keys[joint.key] for joint in self.joints)
         made.fingers = self.fingers.imagined(world, made.bodies, keys)
         return made
@@ -340,7 +349,7 @@ class LinkDynamics:
         """
         self.forget()
         if copies is not None:
-            keys: dict[str, Any] = {grip.key: grip for grip in _grips_of(self.bodies)}
+            keys: dict[str, Any] = {grip.key: grip for grip in grips_of(self.bodies)}
             self.joints = tuple(keys[joint.key] for joint in copies.joints)
             self.fingers.joints = tuple(keys[joint.key] for joint in copies.fingers.joints)
 
@@ -364,7 +373,7 @@ def _frames_of(
     return np.array(own, dtype=int), np.array(other, dtype=int), slides, frames
 
 
-def _grips_of(bodies: Iterable[Body]) -> list[Grip]:
+def grips_of(bodies: Iterable[Body]) -> list[Grip]:
     """Return what holds bodies, joints included."""
     return [grip for body in bodies if (own := dynamics_of(body)) is not None for grip in own.grips]
 

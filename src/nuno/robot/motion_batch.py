@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +17,7 @@ from nuno.robot.trajectory import Motion
 if TYPE_CHECKING:
     from nuno.robot.humanoid import Humanoid
     from nuno.robot.motion_guard import MotionGuard
-    from nuno.robot.wanted_motion import Servo, WantedMotion
+    from nuno.robot.wanted_motion import WantedMotion
 
 
 AT_ONCE = 8192
@@ -130,7 +131,7 @@ class MotionBatch:
         return aims, np.array(ahead.ends[:count]), configurations, angles
 
     def begin(
-        self, end: float, span: float, servo: Servo | None = None, states: Sequence[RobotState] = ()
+        self, end: float, span: float, servo: Callable[..., Any] | None = None, states: Sequence[RobotState] = ()
     ) -> tuple[list[RobotState], np.ndarray]:
         """Return how the copies are to move at a time ``end`` [s], ``span`` [s] from now, and their joints (n, m).
 
@@ -139,7 +140,7 @@ class MotionBatch:
         Args:
             end: [s].
             span: [s].
-            servo: What moves some joints, or None.
+            servo: Moves some joints of a world's copy, which it is told first, or None.
             states: How copies with dynamics move now.
         """
         self._asked, self._pending, self._worked_out = list(range(len(self._motions))), (), ()
@@ -164,7 +165,7 @@ class MotionBatch:
             self._bring(w)
             if self._guards:
                 self._guards[w].before_frame(self._motions[w], span)
-            aims[w] = self._motions[w].begin(end, span, servo)
+            aims[w] = self._motions[w].begin(end, span, None if servo is None else partial(servo, w))
             angles[w] = self._motions[w].robot._angles
         for w in np.flatnonzero(rests & ~alone).tolist():
             before = self._aims[w]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.errors import InvalidInputError, UnknownNameError
+from nuno.robot.gravity import take_gravity
 from nuno.robot.ground import Soles, lowest_corners, moment
 from nuno.robot.imu import InertialUnit
 from nuno.robot.loads import LinkLoads, Load
@@ -98,8 +99,8 @@ class Sensors:
         self.robot, self.links = robot, links
         self.ground = number("ground", ground)
         self._model = robot.model.copy()
-        if links is not None:
-            self._model.gravity.linear = np.array(links.world.gravity)
+        self._world = None if links is None else links.world
+        self._firmly = self._contact_force()
         self._data = self._model.createData()
         self._shapes = ((self._model.nq,), (self._model.nv,), (self._model.nv,))
         self._external = pin.StdVec_Force()
@@ -125,7 +126,6 @@ class Sensors:
         # forces and torques about the soles' middles, as they are about the origins of the joints
         middles = [pin.SE3(np.eye(3), sole.mean(axis=0)) for sole in self._soles]
         self._from_middles = np.array([own.toDualActionMatrix() for own in middles]).reshape(-1, 6, 6)
-        self._firmly = CONTACT * robot.mass * float(np.linalg.norm(self._model.gravity.linear))
         self._channels = self._make_channels(dict(models or {}), seed)
         self._inexact = {name: channel for name, channel in self._channels.items() if not channel.is_exact}
 
@@ -147,6 +147,7 @@ class Sensors:
             InvalidInputError: a state of another robot.
         """
         state = self.state_at_rest() if state is None else state
+        self._take_gravity()
         model, data = self._model, self._data
         if (state.q.shape, state.v.shape, state.a.shape) != self._shapes:
             raise InvalidInputError(
@@ -177,6 +178,17 @@ class Sensors:
         nothing = np.zeros(self._model.nv)
         time = 0.0 if self.links is None else self.links.world.time
         return RobotState(time, self.robot.configuration(), nothing, nothing)
+
+    def _take_gravity(self) -> bool:
+        """Reckon with the gravity that the world has now; return whether it was another before."""
+        changed = self._world is not None and take_gravity(self._model, self._world.gravity)
+        if changed:
+            self._firmly = self._contact_force()
+        return changed
+
+    def _contact_force(self) -> float:
+        """Return with what force [N] a foot presses at least that has contact."""
+        return CONTACT * self.robot.mass * float(np.linalg.norm(self._model.gravity.linear))
 
     # -- forces
 

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from scipy.linalg.lapack import dgesv
 
 from nuno.errors import InvalidInputError
+from nuno.robot.gravity import take_gravity
 from nuno.robot.pinocchio import pin
 from nuno.robot.robot_state import RobotState
 from nuno.robot.trajectory import joint_names
@@ -89,7 +90,7 @@ class Servo:
         self.rows = np.array([robot.joint_index(name) for name in command.names], dtype=int)
         self._robot = robot
         self._model = robot.model.copy()
-        self._model.gravity.linear = np.array(gravity)
+        self.take_gravity(gravity)
         self._data = self._model.createData()
         self._columns = self.rows + 6
         # of Pinocchio's inertia matrix only the upper half is filled
@@ -98,6 +99,10 @@ class Servo:
         lower, upper = robot.joint_limits
         self._limits = lower[self.rows], upper[self.rows]
         self._effort = robot.effort_limits[self.rows]
+
+    def take_gravity(self, gravity: Sequence[float]) -> None:
+        """Reckon with a gravity (3,) [m/s2] from now on."""
+        take_gravity(self._model, gravity)
 
     def step(
         self, before: RobotState, others: tuple[np.ndarray, np.ndarray, np.ndarray], base: np.ndarray | None,
@@ -163,12 +168,11 @@ class Servo:
         return np.asarray(dgesv(matrix, right)[2])
 
 
-def external_forces(links: Links, loads: Sequence[Load]) -> Any:
-    """Return what loads do to each joint, in the joints' own frames where the robot is now."""
+def external_forces(links: Links, loads: Sequence[Load], placements: Any) -> Any:
+    """Return what loads do to each joint, in the joints' own frames, which have Pinocchio's placements."""
     found = pin.StdVec_Force()
     for _ in range(links.robot.model.njoints):
         found.append(pin.Force.Zero())
-    placements = links.robot.update().oMi
     for load in loads:
         joint = links.joints[load.link]
         torque = load.torque + np.cross(load.point, load.force)

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.errors import BodyStateError, InvalidInputError
+from nuno.robot.link_dynamics import grips_of
 from nuno.robot.link_posture import posture_of
 from nuno.robot.simulated_senses import SimulatedSenses
 from nuno.robot.trajectory_controller import ARRIVED
 from nuno.validation import checked
 
 if TYPE_CHECKING:
+    from nuno.joints.grip import Grip
     from nuno.robot.balance import Balance
     from nuno.robot.burden import Burden
     from nuno.robot.gait import Gait
@@ -105,15 +108,22 @@ class SimulatedBody(SimulatedSenses):
             dynamics = None if self.balance is None else self.balance.dynamics
             joints = () if dynamics is None else dynamics.joints
             kept = bool(joints and moving) and all(joint.active for joint in joints)
+            held: dict[str, Sequence[Grip]] = {}
             if not kept:  # links that stood, or moved by the joints of another process
+                for name, hand in self.hands.items():
+                    hand.take_over()
+                    held[name] = hand.grips if moving else ()
                 for body in moving:
                     self.world.detach(body)
                 if dynamics is not None:
                     dynamics.forget()
                 self._set_tolerance()
             self._start_from(posture_of(self.links))
-            for hand in self.hands.values():
+            for name, hand in self.hands.items():
                 hand.take_over()
+                hand.hold_on(held.get(name, ()))
+                if held and moving and hand.has_fingers:  # what it pressed on, as far as places tell
+                    hand.close(hand.filled_by())
             if joints and moving and not kept:
                 self.attach()
 
@@ -153,11 +163,15 @@ class SimulatedBody(SimulatedSenses):
             if self.balance is None or not self.is_dynamic:
                 raise BodyStateError(f"{self.actual.name!r} has no dynamics")
             pressed = {name: hand.held for name, hand in self.hands.items() if hand.presses}
+            held = {name: hand.grips for name, hand in self.hands.items()}
+            self._tell_ending(held)
             self.balance.dynamics.detach()
             if not self.links.missing:
                 self.links.follow(0.0)  # fingers slid apart, each as far as its own forces had it
             for name, bodies in pressed.items():  # what fingers pressed on is gripped from now on
                 self.hands[name].close([body for body in bodies if body.is_dynamic])
+            for name, grips in held.items():
+                self.hands[name].hold_on(grips)
             self._set_tolerance()
             self._start_from(self.actual.configuration())
 
@@ -223,6 +237,19 @@ class SimulatedBody(SimulatedSenses):
             "call robot.set_up(), or restore a snapshot",
             self.actual.name, self.world.time, name, others, farthest, ", ".join(pressed) or "nothing",
         )  # fmt: skip
+
+    def _tell_ending(self, held: Mapping[str, Sequence[Grip]]) -> None:
+        """Warn of grips by the links that end with their dynamics, as no hand made them."""
+        kept, links = {grip for grips in held.values() for grip in grips}, set(self.links.bodies)
+        ending = sorted(
+            f"{grip.body.name!r} by {grip.target.name!r}" for grip in grips_of(self.world.bodies)
+            if grip.target in links and grip.body not in links and grip not in kept
+        )  # fmt: skip
+        if ending:
+            logger.warning(
+                "what a program gripped to links of %r, or joined to them, is let go as they lose their dynamics: %s; "
+                "grip it anew. What its hands hold stays held", self.actual.name, ", ".join(ending),
+            )  # fmt: skip
 
     def _set_tolerance(self) -> None:
         """Let goals without tolerances end with their time where motors move the joints, as on robots with motors."""

@@ -231,7 +231,7 @@ class SimulatedRobot(SimulatedBase):
     def _external(self) -> Any:
         """Return what bodies do to the links, None where there is nothing."""
         loads = self.loads.read() if any(own.is_dynamic for own in self.world.bodies) else ()
-        return external_forces(self.links, loads) if loads else None
+        return external_forces(self.links, loads, self.links.robot.update().oMi) if loads else None
 
     def _controller_name(self, controller: Controller) -> str:
         name = controller["controller_type"]
@@ -375,4 +375,5 @@ class SimulatedRobot(SimulatedBase):
 
     def _serve(self, before: RobotState, others: Any, base: Any, span: float) -> tuple[np.ndarray, Any]:
         assert self._servo is not None
+        self._servo.take_gravity(self.world.gravity)
         return self._servo.rows, self._servo.step(before, others, base, span, self._external())

@@ -60,11 +60,16 @@ class Stabiliser:
         self._outlines = list(corners[:, [0, 2, 3, 1]])
         # of each sole, the radius of the greatest disc in it
         self._inner = np.abs(corners[:, :, :2]).min(axis=(1, 2))
-        self.gravity = float(np.linalg.norm(gravity))
-        self._mass, self._weight = robot.mass, robot.mass * self.gravity
+        self._mass = robot.mass
+        self.take_gravity(gravity)
         pin.framesForwardKinematics(robot.model, self._data, robot.posture_configuration())
         places = [self._data.oMf[foot].translation.copy() for foot in self._feet]
         self._stance = float(np.linalg.norm(places[0] - places[-1]))
+
+    def take_gravity(self, gravity: Any) -> None:
+        """Reckon with a gravity (3,) [m/s2] from now on."""
+        self.gravity = float(np.linalg.norm(gravity))
+        self._weight = self._mass * self.gravity
 
     def imagined(self) -> Stabiliser:
         """Return the same for copies of the robot."""

@@ -19,6 +19,7 @@ import numpy as np
 from nuno.errors import MissingPackageError
 from nuno.robot.aims import Aims
 from nuno.robot.foot_kinematics import WORLD_AXES, FootKinematics
+from nuno.robot.gravity import take_gravity
 from nuno.robot.pinocchio import pin
 from nuno.robot.robot_state import RobotState
 from nuno.robot.sensors import sole_corners
@@ -85,7 +86,7 @@ class WholeBodyControl:
         self, robot: Robot, gravity: Any = (0.0, 0.0, -9.81), *, friction: float = 0.6, gains: Gains | None = None
     ) -> None:
         self._model = robot.model.copy()
-        self._model.gravity.linear = np.array(gravity, dtype=float)
+        take_gravity(self._model, gravity)
         self._data = self._model.createData()
         self._nothing = np.zeros(self._model.nv)
         self.gains = gains or Gains()
@@ -112,8 +113,13 @@ class WholeBodyControl:
     def imagined(self) -> WholeBodyControl:
         """Return the same for copies of the robot."""
         made = copy.copy(self)
-        made._data, made._programs = self._model.createData(), {}
+        made._model = self._model.copy()
+        made._data, made._programs = made._model.createData(), {}
         return made
+
+    def take_gravity(self, gravity: Sequence[float]) -> None:
+        """Reckon with a gravity (3,) [m/s2] from now on."""
+        take_gravity(self._model, gravity)
 
     def solve(
         self, now: Sequence[RobotState], motion: FootKinematics, aims: Aims

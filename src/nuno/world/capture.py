@@ -58,9 +58,10 @@ def apply(snapshot: Snapshot, world: Advancing) -> None:
     neutral = snapshot.engine == NEUTRAL
     _check_engine(snapshot, world)
     bodies = {record.key: _recorded_body(record, snapshot, world) for record in snapshot.bodies}
-    before = (world.gravity, world.frame_rate, world.substeps, world.world_count)
-    same_settings = before[:3] == (snapshot.gravity, snapshot.frame_rate, snapshot.substeps)
-    world.gravity, world.frame_rate, world.substeps = snapshot.gravity, snapshot.frame_rate, snapshot.substeps
+    before, count = (world.gravity, world.frame_rate, world.substeps), world.world_count
+    same_settings = before == (snapshot.gravity, snapshot.frame_rate, snapshot.substeps)
+    take_settings = world._take_settings
+    take_settings(snapshot.gravity, snapshot.frame_rate, snapshot.substeps)
     world.world_count = snapshot.world_count
     scene = world._rigid
     try:
@@ -70,7 +71,8 @@ def apply(snapshot: Snapshot, world: Advancing) -> None:
             for record in snapshot.bodies if record.dynamics is not None
         }  # fmt: skip
     except BaseException:
-        world.gravity, world.frame_rate, world.substeps, world.world_count = before
+        take_settings(*before)
+        world.world_count = count
         world._rigid = scene
         raise
     _take_apart(world, list(made.values()))

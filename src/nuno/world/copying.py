@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, Self
 
@@ -73,6 +74,10 @@ class Copying(Running):
             for driver in unrecorded:
                 if (restored := getattr(driver, "restored", None)) is not None:
                     restored()
+
+    def _go_by(self, **changed: Any) -> None:
+        """Let all that moves go by other settings: become what is now, with solvers that are made for them."""
+        apply(replace(capture(self), **changed), self)
 
     def reset(self, worlds: ArrayLike, saved: Snapshot) -> None:
         """Let some worlds of a batch become what was saved, and leave all others as they are, to the bit.

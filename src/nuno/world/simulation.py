@@ -25,10 +25,10 @@ from nuno.joints.held_points import holding, released
 from nuno.joints.joint import Joint
 from nuno.materials import Rigid
 from nuno.tables.kinematic_motion import Schedule, is_kinematic, make_schedule, path_batches_of
-from nuno.validation import count, finite_array, number
 from nuno.world.background import FrameLock
 from nuno.world.device import checked_device, found_device
 from nuno.world.pace import Pace
+from nuno.world.settings import Settings
 
 if TYPE_CHECKING:
     from nuno.dynamics.rigid_dynamics import RigidScene
@@ -39,13 +39,9 @@ if TYPE_CHECKING:
 
 CHUNK = 30  # frames between two looks at whether the state is finite: what a diverged run can lose
 CUDA_CHUNK = 60  # the same on CUDA, which idles while it is looked at
-MAX_SUBSTEPS = 10_000
-"""Of a frame: at 60 frames a second 1.7 us each, in which what moves at 1 cm/s does so by less than floats resolve."""
-MAX_FRAMES = 1_000_000.0
-"""A second, [1/s]."""
 
 
-class Simulation:
+class Simulation(Settings):
     """The bodies of one world, or of a batch of equal ones, and their time; the arguments are ``World``'s."""
 
     def __init__(
@@ -55,10 +51,7 @@ class Simulation:
         self._device = checked_device(device)
         if device.startswith("cuda"):  # "auto" and "cpu" are always there, and Warp is loaded when they are used
             found_device(device)
-        gx, gy, gz = finite_array("gravity", gravity, (3,))
-        self.gravity: tuple[float, float, float] = (float(gx), float(gy), float(gz))
-        self.frame_rate = number("frame_rate", frame_rate, above=0.0, high=MAX_FRAMES)
-        self.substeps = None if substeps is None else count("substeps", substeps, high=MAX_SUBSTEPS)
+        super().__init__(gravity, frame_rate, substeps)
         self.world_count = 1
         self.lock = FrameLock()  # hold it (``with world.lock:``) to read several bodies at the same instant
         self._time = 0.0
