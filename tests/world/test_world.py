@@ -413,3 +413,17 @@ def test_imagined_worlds_are_without_drivers_and_say_so(caplog):
         assert not world.imagine(2).drivers
     assert len(caplog.messages) == 1
     assert "<mill>" in caplog.messages[0] and "stands still" in caplog.messages[0]
+
+
+def test_body_added_twice_in_its_place_is_told_of(caplog):
+    """A cell that runs again doubles what it adds; the warning names both, and what lies elsewhere is left alone."""
+    world = nuno.World(device="cpu")
+    with caplog.at_level("WARNING", logger="nuno"):
+        for _ in range(2):
+            world.add(nuno.box((0.1, 0.1, 0.1), name="cup", position=(0, 0, 0.05)))
+        assert [record.getMessage() for record in caplog.records if "'cup_1'" in record.getMessage()]
+        assert "nuno.World()" in caplog.text
+        caplog.clear()
+        world.add(nuno.box((0.1, 0.1, 0.1), name="cup", position=(0, 0, 0.3)))
+        world.add(nuno.sphere(0.05, name="cup", position=(0, 0, 0.05)))
+    assert not caplog.records

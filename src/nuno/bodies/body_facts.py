@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from typing import Any, Protocol
 
 import numpy as np
@@ -9,9 +10,15 @@ import numpy as np
 from nuno.materials import Material
 from nuno.shapes.shape import Shape
 
+_log = logging.getLogger(__name__)
+
 
 class DescribedBody(Protocol):
     """A body as notebooks show it."""
+
+    @property
+    def name(self) -> str:
+        """Its name, unique in its world."""
 
     @property
     def shape(self) -> Shape:
@@ -63,3 +70,13 @@ def place_text(body: DescribedBody) -> str:
 def millimetres(place: np.ndarray) -> str:
     """Return coordinates as text, to the millimetre."""
     return "(" + ", ".join(f"{value:.3f}" for value in np.round(place, 3) + 0.0) + ")"
+
+
+def warn_of_double(body: DescribedBody, other: DescribedBody, name: str) -> None:
+    """Tell of a body that gets another name, as ``other`` has its own, and is in the same place with the same shape."""
+    if body.shape.kind == other.shape.kind and np.array_equal(body.vertices, other.vertices):
+        _log.warning(
+            "there is %r in the same place already, so this one is added as %r and the two overlap. If a program or a "
+            "notebook's cell runs again, let it begin with a new nuno.World(), or world.remove the first",
+            other.name, name,
+        )  # fmt: skip

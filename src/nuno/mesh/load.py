@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -12,9 +13,17 @@ from nuno.errors import MeshError
 
 MeshSource = Any  # a path, a trimesh.Trimesh, or (vertices, faces)
 
+USUAL_EXTENT = 20.0
+"""Extent [m] above which a file's numbers are probably not metres: a mug of 8 cm in millimetres is 80."""
+
+_log = logging.getLogger(__name__)
+
 
 def load_mesh(source: MeshSource) -> tuple[np.ndarray, np.ndarray]:
     """Return vertices (n, 3) [m] and faces (m, 3) of a mesh.
+
+    Vertices of a file at the same place become one. Files repeat them where texture or normal jump, and a cloth would
+    come apart there. A file larger than `USUAL_EXTENT` gives a warning.
 
     Args:
         source: A path of a file that trimesh reads (STL, OBJ, PLY, GLB ...; its numbers are metres), a
@@ -51,4 +60,12 @@ def _from_file(path: Path) -> tuple[np.ndarray, np.ndarray]:
         raise MeshError(f"cannot read {str(path)!r} as a mesh: {error}") from error
     if len(getattr(loaded, "faces", ())) == 0:
         raise MeshError(f"{str(path)!r} holds no triangles")
+    if len(np.unique(loaded.vertices, axis=0)) < len(loaded.vertices):  # others keep their order
+        loaded.merge_vertices(merge_tex=True, merge_norm=True)
+    if (extent := float(np.ptp(loaded.vertices, axis=0).max())) > USUAL_EXTENT:
+        _log.warning(
+            "%r is %.4g m long, as its numbers are taken for metres. If they are millimetres, read it by "
+            "mesh = trimesh.load(path, force='mesh'), shrink it by mesh.apply_scale(0.001), and give the mesh",
+            str(path), extent,
+        )  # fmt: skip
     return np.asarray(loaded.vertices), np.asarray(loaded.faces)

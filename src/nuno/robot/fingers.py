@@ -79,22 +79,7 @@ def fingers_of(robot: RobotModel) -> tuple[Finger, ...]:
         frame = model.frames[robot.frame_index(name)]
         axis = frame.placement.rotation[:, CLOSING]
         for links in grasp.fingers:
-            inertia, places = pin.Inertia.Zero(), []  # Pinocchio has a link's at the frame of the joint that fixes it
-            for link in links:
-                number = frame_called(model, link)
-                if number >= model.nframes:
-                    raise RobotModelError(f"{robot.name!r} has no link {link!r} to be a finger of {name!r}")
-                own = model.frames[number]
-                if own.parentJoint != frame.parentJoint:
-                    raise InvalidInputError(
-                        f"the finger {link!r} of {name!r} moves with {model.names[own.parentJoint]!r}; only links that "
-                        f"are fixed to {model.names[frame.parentJoint]!r} slide"
-                    )
-                for each in (own, model.frames[own.parentFrame]):
-                    if each.inertia.mass > 0.0:
-                        inertia += each.placement.act(each.inertia)
-                places.append(own.placement.translation)
-            place = inertia.lever if inertia.mass > 0.0 else np.mean(places, axis=0)
+            inertia, place = _inertia_and_place(robot, name, links)
             aside = float((place - frame.placement.translation) @ axis)
             if abs(aside) < 1e-6:
                 raise InvalidInputError(f"the finger {links[0]!r} of {name!r} lies in the middle of the hand")
@@ -105,6 +90,31 @@ def fingers_of(robot: RobotModel) -> tuple[Finger, ...]:
                 )
             )
     return tuple(found)
+
+
+def _inertia_and_place(robot: RobotModel, hand: str, links: Sequence[str]) -> tuple[Any, np.ndarray]:
+    """Return the inertia of a finger's links, and its centre of mass (3,) [m] in the frame of the joint that bears it.
+
+    Without any mass its place is the mean of the links' origins.
+    """
+    model = robot.model
+    frame = model.frames[robot.frame_index(hand)]
+    inertia, places = pin.Inertia.Zero(), []  # Pinocchio has a link's at the frame of the joint that fixes it
+    for link in links:
+        number = frame_called(model, link)
+        if number >= model.nframes:
+            raise RobotModelError(f"{robot.name!r} has no link {link!r} to be a finger of {hand!r}")
+        own = model.frames[number]
+        if own.parentJoint != frame.parentJoint:
+            raise InvalidInputError(
+                f"the finger {link!r} of {hand!r} moves with {model.names[own.parentJoint]!r}; only links that "
+                f"are fixed to {model.names[frame.parentJoint]!r} slide"
+            )
+        for each in (own, model.frames[own.parentFrame]):
+            if each.inertia.mass > 0.0:
+                inertia += each.placement.act(each.inertia)
+        places.append(own.placement.translation)
+    return inertia, inertia.lever if inertia.mass > 0.0 else np.mean(places, axis=0)
 
 
 class FingerBodies:

@@ -96,7 +96,10 @@ def of_shell(points: np.ndarray, faces: np.ndarray, thickness: float) -> MassPro
         MeshError: no thickness, or triangles without area.
     """
     if thickness <= 0.0:
-        raise MeshError(f"an open mesh needs a thickness to have a mass, got {thickness}")
+        raise MeshError(
+            f"an open mesh that is no cloth has no mass, got a thickness of {thickness}; close it "
+            "(trimesh.repair.fill_holes), or give nuno.cloth_mesh, which has the thickness of its cloth, Rigid"
+        )
     corners = points[faces]
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     twice = np.linalg.norm(cross, axis=1)

@@ -84,7 +84,7 @@ class SoftSolver(ParticleSolver):
         frame_rate: Frames a second.
         substeps: Substeps a frame; None takes `soft_substeps`.
         friction: Friction coefficient of the body; None takes the material's. A number or one per world.
-        self_contact: Kept, but without effect: see the limitations.
+        self_contact: Without effect here: its coupling (`nuno.solvers.coupling`) solves contact with itself.
         plan: "auto", "fused" (a thread per world or sixteen worlds, or a block per world), "vector" (one world on
             the CPU by sixteen elements at a time) or "grid" (all blocks of a CUDA device together), all with the same
             bits on a device.
@@ -92,9 +92,9 @@ class SoftSolver(ParticleSolver):
     A vertex touches shapes where it is, without a thickness, and so do the surface's edges and triangles sharp ones.
     Inner vertices are tested too: in a cube of ten cells a side that is 2 % of a substep.
 
-    Limitations: one pass a substep, so that what is stiffer than the substeps carry comes out softer than stated; a
-    soft body does not touch itself; linear tetrahedra are too stiff in bending, and near a Poisson ratio of 0.5, where
-    a inverted body may stay inverted.
+    Limitations: one pass a substep, so that what is stiffer than the substeps carry comes out softer than stated;
+    without a coupling a soft body does not touch itself; linear tetrahedra are too stiff in bending, and near a
+    Poisson ratio of 0.5, where an inverted body may stay inverted.
     """
 
     def __init__(

@@ -57,14 +57,8 @@ def find_trees(pairs: Sequence[tuple[int, int]]) -> Forest:
     for first, _ in pairs:
         if first in seen:
             continue
-        bodies = [first]
-        seen.add(first)
-        for body in bodies:
-            for k in at[body]:
-                for other in pairs[k]:
-                    if other != ANCHOR and other not in seen:
-                        seen.add(other)
-                        bodies.append(other)
+        bodies = _joined_bodies(first, pairs, at)
+        seen.update(bodies)
         own = sorted({k for body in bodies for k in at[body]})
         anchored = [k for k in own if ANCHOR in pairs[k]]
         if len(own) < 2 or len(own) != len(bodies) - 1 + len(anchored) or len(anchored) > 1:
@@ -116,3 +110,14 @@ def tree_table(pairs: Sequence[tuple[int, int]], worlds: int, device: str) -> Tr
     ):  # fmt: skip
         setattr(table, name, wp.zeros(count, dtype=kind, device=device))
     return table
+
+
+def _joined_bodies(first: int, pairs: Sequence[tuple[int, int]], at: dict[int, list[int]]) -> list[int]:
+    """Return a body and all that joints join it to, directly or through others, the nearest first."""
+    bodies, seen = [first], {first, ANCHOR}
+    for body in bodies:
+        for other in (other for k in at[body] for other in pairs[k]):
+            if other not in seen:
+                seen.add(other)
+                bodies.append(other)
+    return bodies

@@ -119,14 +119,7 @@ def _grouped(tets: np.ndarray, across: np.ndarray, order: np.ndarray) -> tuple[l
         for k in left:
             if not free[k]:
                 continue
-            found, own = [], set(corners[k])
-            for corner, other in enumerate(neighbours[k]):
-                if other >= 0 and free[other]:
-                    (tip,) = set(corners[other]) - set(corners[k])
-                    # two outer elements of one tip would each have their own idea of where it is
-                    if tip not in own:
-                        own.add(tip)
-                        found.append((corner, other))
+            found = _outer_elements(k, corners, neighbours[k], free)
             if len(found) >= wanted:
                 inner.append(k)
                 outer.append(found)
@@ -134,6 +127,19 @@ def _grouped(tets: np.ndarray, across: np.ndarray, order: np.ndarray) -> tuple[l
                     free[element] = False
         left = [k for k in left if free[k]]
     return inner, outer
+
+
+def _outer_elements(k: int, corners: list[list[int]], neighbours: list[int], free: list[bool]) -> list[tuple[int, int]]:
+    """Return the free neighbours that element k may take into its cluster, as (corner across from them, element)."""
+    found, own = [], set(corners[k])
+    for corner, other in enumerate(neighbours):
+        if other >= 0 and free[other]:
+            (tip,) = set(corners[other]) - set(corners[k])
+            # two outer elements of one tip would each have their own idea of where it is
+            if tip not in own:
+                own.add(tip)
+                found.append((corner, other))
+    return found
 
 
 def _arranged(tets: np.ndarray, inner: list[int], outer: list[list[tuple[int, int]]]) -> tuple[np.ndarray, np.ndarray]:

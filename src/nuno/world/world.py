@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.bodies.body import Body
-from nuno.bodies.body_facts import place_text
+from nuno.bodies.body_facts import place_text, warn_of_double
 from nuno.bodies.given_velocity import given_velocity, present_velocity
 from nuno.dynamics.dynamics import check_material, default_material
 from nuno.dynamics.push import make_push
@@ -88,6 +88,8 @@ class World(Setting):
             while name in taken:
                 number_ += 1
                 name = f"{body._name}_{number_}"
+            if number_:
+                warn_of_double(body, self._own(body._name), name)
             body._name = name
             self._register(body)
             self._colliders_changed()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass, field
+from itertools import combinations, product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -224,12 +225,10 @@ def _transform(place: np.ndarray, turn: np.ndarray) -> Any:
 def _filter(scene: Any, world: EngineWorld, bodies: list[Body], shapes: dict[str, list[list[int]]], index: int) -> None:
     """Keep shapes of bodies from touching that are to pass through each other."""
     with_shapes = [body for body in bodies if shapes[body.key]]
-    for k, a in enumerate(with_shapes):
-        for b in with_shapes[k + 1 :]:
-            if not rules_of(world).touch(a, b):
-                for one in shapes[a.key][index]:
-                    for other in shapes[b.key][index]:
-                        scene.add_shape_collision_filter_pair(one, other)
+    for a, b in combinations(with_shapes, 2):
+        if not rules_of(world).touch(a, b):
+            for one, other in product(shapes[a.key][index], shapes[b.key][index]):
+                scene.add_shape_collision_filter_pair(one, other)
 
 
 def _warn_of_exceptions(world: EngineWorld, deforming: list[Body], bodies: list[Body]) -> None:
