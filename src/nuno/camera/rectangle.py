@@ -17,7 +17,7 @@ SQUARE = "the sides, "
 """How a warning begins that tells of a square cloth: it names the corners, and makes no number less sure."""
 UNEVEN = "the cloth's sides are not straight"
 """The same of one whose outline is rough or wavy."""
-LARGEST = 20.0
+MAX_SIDE = 20.0
 """[m] A cloth with a longer side than this is measured in other units than metres."""
 _SQUARE = 0.02  # sides this close to each other do not say which one is the longer
 _CORNERS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])  # anticlockwise from above
@@ -261,7 +261,7 @@ def _labelled(pose: _Pose, camera: Camera, height: float, residual: float, warni
         swap = behind > ahead
     if swap:
         order = [order[0], order[3], order[2], order[1]]
-    if max(ahead, behind) > LARGEST:
+    if max(ahead, behind) > MAX_SIDE:
         raise InvalidInputError(
             f"the cloth would be {max(ahead, behind):.0f} x {min(ahead, behind):.0f} m: are the camera's place and the "
             "table in metres?"
