@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
+from functools import partial
 
 import cv2
 import numpy as np
@@ -11,6 +13,7 @@ from synthetic import LOOKS, REST_HEIGHT, Pair, look_at, make_pair
 
 from few_variants import few
 from nuno.camera.camera import Camera
+from nuno.camera.cloth_outline import fit_outline
 from nuno.camera.rectangle import ClothRectangle, fit_rectangle
 from nuno.camera.segmentation import segment_before
 from nuno.camera.table import plane_coordinates
@@ -188,6 +191,17 @@ def test_other_shapes() -> None:
     torn = mask & ~((xy[..., 0] < -0.02) & (xy[..., 1] > 0.06))
     found = fit_rectangle(torn, picture(BESIDE, torn), BESIDE, HEIGHT)
     assert any("not quite" in warning for warning in found.warnings)
+
+
+def test_millimetres_are_named() -> None:
+    """A camera and a plane in millimetres make a cloth of 600 m, which is refused as one, and as an outline."""
+    mask, _ = draw(BESIDE, (0.1, 0.0), (0.6, 0.4), 0.3)
+    pose = BESIDE.camera_to_world.copy()
+    pose[:3, 3] *= 1000.0
+    camera = replace(BESIDE, camera_to_world=pose)
+    for fit in (partial(fit_rectangle, mask, None), partial(fit_outline, mask)):
+        with pytest.raises(InvalidInputError, match="in metres"):
+            fit(camera, 1000.0 * HEIGHT)
 
 
 def test_empty_and_tiny_masks() -> None:

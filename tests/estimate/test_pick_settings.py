@@ -28,6 +28,8 @@ def test_a_grid_names_its_candidates():
     found = settings()
     assert found.labels.tolist() == [[0, 0], [0, 1], [1, 0], [1, 1], [2, 0], [2, 1]]
     np.testing.assert_array_equal(found.uv, found.labels / (2, 1))
+    for same in ([3, 2], (np.int64(3), np.int32(2))):
+        np.testing.assert_array_equal(settings(candidates=same).labels, found.labels)
     points = settings(candidates=[[0.25, 1.0]])
     assert points.labels.tolist() == points.uv.tolist() == [[0.25, 1.0]] and points.grid == (2, 2)
 
@@ -46,6 +48,9 @@ def test_scores_without_evidence_are_not_turned():
         (dict(hand=(0.0, 0.0, -0.1)), "below the table's top"),
         (dict(hand=(2.0, 0.0, 2.0)), "behind the camera"),
         (dict(candidates=(1, 4)), "at least 2 x 2"),
+        (dict(candidates=[1, 4]), "at least 2 x 2"),
+        (dict(rest_height=2.5), "rest_height"),
+        (dict(hand_radius=14.0), "hand_radius"),
         (dict(turns=(0.1,)), "0 among them"),
         (dict(discretisations=()), "must begin with one that looks at all candidates"),
     ],

@@ -7,7 +7,8 @@ import nuno
 from nuno.camera.camera import Camera
 from nuno.camera.rectangle import ClothRectangle
 from nuno.camera.table import Table
-from nuno.estimate.seeing import _doubts, _oddities, _uncovered, begin_to_see
+from nuno.estimate.doubt import share_of_doubt
+from nuno.estimate.seeing import _doubts, _oddities, _outside, _uncovered, begin_to_see
 
 POSE = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 1.0], [0.0, 0.0, 0.0, 1.0]])
 CAMERA = Camera(80, 60, 60.0, 60.0, 39.5, 29.5, POSE)
@@ -67,6 +68,22 @@ def test_a_cloth_that_is_not_at_the_hand_is_odd():
     (warning,) = _oddities(far, ignored)
     # 25 px both ways between the hand's last pixel and the cloth's first; OpenCV's 5 x 5 distance is right to 2 %
     assert "away from the hand" in warning and 33 <= int(warning.split(" px")[0].split()[-1]) <= 36
+
+
+def test_what_the_image_after_does_not_show_is_told():
+    """A hand out of the image, by its pixel, and a cloth that goes on beyond the border, by its outline's share."""
+    at_hand = np.zeros((60, 80), dtype=bool)
+    at_hand[10:16, 10:16] = True
+    nothing = np.zeros_like(at_hand)
+    assert _outside(square(), at_hand, np.array((12.5, 12.5))) == ()
+    (hand,) = _outside(square(), nothing, np.array((40.0, -70.0)))
+    assert "pixel (40, -70) of 80 x 60" in hand and share_of_doubt(0.0, (hand,)) == pytest.approx(0.4)
+    below = square()
+    below[50:] = below[49]  # goes on to the border: 40 of its 2 (38 + 40) outline's pixels
+    (cut,) = _outside(below, at_hand, np.array((12.5, 12.5)))
+    assert cut.startswith("26% of the cloth's outline")
+    assert len(_outside(below, nothing, np.array((40.0, -70.0)))) == 2
+    assert _outside(nothing, at_hand, np.array((12.5, 12.5))) == ()
 
 
 def test_a_mask_in_doubt_gets_a_warning():

@@ -159,6 +159,75 @@ def test_the_likeliest_material_is_adopted():
     assert np.all(np.asarray(towel.material.bending_rigidity) == 1e-6)
 
 
+@pytest.mark.parametrize("frames", [1, 2, 3, 3.5, 4, 5, 6])
+def test_a_cloth_aside_comes_nearer_whatever_the_rate_of_images(frames):
+    """On a table, 15 mm aside, a cloth is met within half a cell (25 mm) at any rate, and goes no other way."""
+    world, towel = room()
+    shown, there = room()
+    shown.set_vertices(there, there.vertices + np.array([0.015, 0.0, 0.0]))
+    seen = look(shown, there)
+    follower = nuno.follow(world, towel, CAMERA)
+    farthest = 0.0
+    for k in range(1, int(72 / frames) + 1):
+        follower.update(k * frames / 60.0, *seen)
+        farthest = max(farthest, np.linalg.norm(towel.vertices - there.vertices, axis=1).mean())
+    assert farthest < 0.0175  # what begins at 15 mm, and half a pixel of 8 mm at most
+    assert np.linalg.norm(towel.vertices - there.vertices, axis=1).mean() < 0.01
+
+
+def test_an_image_of_the_world_s_own_time_draws_nothing_and_says_so(caplog):
+    """Of two followers of a world the second is told that no time is left; by turns both cloths are drawn."""
+
+    def two(aside):
+        world = nuno.World(device="cpu")
+        world.add(nuno.box((1.0, 1.0, 0.02), name="table", position=(0, 0, -0.01)))
+        cloths = [
+            world.add(nuno.sheet((0.2, 0.2), (5, 5), name=name, position=(x + aside, 0, 0.002)))
+            for name, x in (("a", -0.15), ("b", 0.15))
+        ]
+        for cloth in cloths:
+            world.attach(cloth)
+        return world, cloths
+
+    shown, there = two(0.0)
+    seen = [look(shown, cloth) for cloth in there]
+    world, cloths = two(0.015)
+    first, second = (nuno.follow(world, cloth, CAMERA) for cloth in cloths)
+    with caplog.at_level(logging.WARNING, "nuno"):
+        assert second.update(0.0, *seen[1]).reason == "instant"  # a first image, which is told of no one
+        assert not caplog.records
+        assert first.update(0.1, *seen[0]).used
+        before = cloths[1].vertices
+        for _ in range(2):
+            told = second.update(0.1, *seen[1])
+            assert told.reason == "instant" and not told.used and not told.forces.any()
+    np.testing.assert_array_equal(cloths[1].vertices, before)
+    assert [r.getMessage() for r in caplog.records if "by turns" in r.getMessage()] != []
+    assert sum("said once" in r.getMessage() for r in caplog.records) == 1
+    for k in range(3, 33):
+        assert (first, second)[k % 2].update(0.05 * k, *seen[k % 2]).used
+    for cloth, true in zip(cloths, there, strict=True):
+        assert np.linalg.norm(cloth.vertices - true.vertices, axis=1).mean() < 0.01  # it began 15 mm off
+
+
+@pytest.mark.parametrize("everywhere", [True, False])
+def test_a_cloth_without_any_known_depth_is_followed_by_its_mask(everywhere):
+    """Where the depth has holes all over the cloth, what its mask alone tells comes of it, to the bit."""
+    found = []
+    for with_depth in (True, False):
+        world, towel = room()
+        shown, there = room()
+        shown.set_vertices(there, there.vertices + np.array([0.02, 0.0, 0.0]))
+        mask, depth = look(shown, there)
+        holes = np.where(np.ones_like(mask) if everywhere else mask > 0, np.nan, depth)
+        follower = nuno.follow(world, towel, CAMERA)
+        for k in range(1, 6):
+            told = follower.update(0.1 * k, mask, holes if with_depth else None)
+            assert told.used and told.agreement > 0.5
+        found.append(towel.vertices)
+    np.testing.assert_array_equal(*found)
+
+
 def test_a_gripped_corner_stays_in_the_hand():
     """A grip on a path holds its corner whatever the images show."""
     world, towel = room()
@@ -220,6 +289,22 @@ def test_restoring_amidst_goes_on_as_before():
             follower.update(0.1 * k, *look(shown, there))
         found.append(towel.vertices)
     np.testing.assert_array_equal(*found)
+
+
+def test_what_drew_a_cloth_ends_where_the_program_puts_it_elsewhere():
+    """Put where it is seen, a cloth that friction held aside is pushed by nothing that was built up before."""
+    world, towel = room()
+    shown, there = room()
+    shown.set_vertices(there, there.vertices + np.array([0.02, 0.0, 0.0]))
+    world.run(0.3), shown.run(0.3)
+    seen = look(shown, there)
+    follower = nuno.follow(world, towel, CAMERA)
+    for k in range(1, 4):
+        assert follower.update(0.3 + 0.15 * k, *seen).forces.any()
+    world.set_vertices(towel, there.vertices, np.zeros_like(there.vertices))
+    told = follower.update(0.9, *seen)
+    # as of a still cloth that is seen as it is: but the depth's steps of 10 um nothing draws it
+    assert np.abs(told.forces).max() < 1e-6 * towel.mass * 9.81 / len(towel.vertices) + 1e-5
 
 
 def test_images_are_segmented_by_the_first_ones_colours():
@@ -299,7 +384,8 @@ def test_bad_images_are_named_and_change_nothing():
     negative = np.where(mask > 0, -depth, depth)
     bad = [(np.zeros((3, 4), bool),), (mask, depth[:5]), (mask, 1000.0 * depth), (mask, None, depth[:4]),
            (mask, negative), (None, -depth),
-           (np.zeros((90, 120, 3)),), ("mask",), (mask, "depth")]  # fmt: skip
+           (np.zeros((90, 120, 3)),), ("mask",), (mask, "depth"),
+           (np.zeros((90, 120, 3), np.uint8), 1000.0 * depth)]  # fmt: skip
     for parts in bad:
         with pytest.raises(nuno.ImageError):
             follower.update(0.1, *parts)

@@ -19,6 +19,14 @@ def test_phases_displace_by_one(frames):
     assert sum(duration for duration, _ in parts) == pytest.approx(frames * frame)
 
 
+@pytest.mark.parametrize("frames", [2, 2.5, 3, 3.9, 4, 5, 7])
+def test_what_is_pulled_keeps_some_of_its_velocity(frames):
+    """However a span divides into frames, braking leaves 0.4 of the velocity that the pull gave, and turns none."""
+    frame = 1.0 / 60.0
+    (first, pull), (second, brake) = phases(frames * frame, frame)
+    assert pull * first + brake * second == pytest.approx(0.4 * pull * first)
+
+
 def test_more_is_taken_off_within_longer():
     """1 - exp(-t / 0.08 s): two spans leave the product of what each leaves."""
     assert (1.0 - gain(0.1)) ** 2 == pytest.approx(1.0 - gain(0.2))

@@ -58,7 +58,9 @@ def first_look(rgb: np.ndarray, camera: Camera, table: Table, hint: np.ndarray |
         surface &= around
         rim = surface & ~box
     if surface.sum() < 30:
-        raise ClothNotFoundError("no cloth: the camera does not see the table, or not where the hint is")
+        raise ClothNotFoundError(
+            "no cloth: the camera does not see the table, or not where the hint is; are both in one frame, in metres?"
+        )
     if not rim.any() and table.half_extents is None:
         return _surrounded(small, xy, hint)
     rim = rim if rim.sum() > 30 else surface

@@ -17,6 +17,8 @@ SQUARE = "the sides, "
 """How a warning begins that tells of a square cloth: it names the corners, and makes no number less sure."""
 UNEVEN = "the cloth's sides are not straight"
 """The same of one whose outline is rough or wavy."""
+MAX_SIDE = 20.0
+"""[m] A cloth with a longer side than this is measured in other units than metres."""
 _SQUARE = 0.02  # sides this close to each other do not say which one is the longer
 _CORNERS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])  # anticlockwise from above
 _OUTWARD = np.array([[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]])  # normal of the side after each corner
@@ -105,6 +107,7 @@ def fit_rectangle(mask: ArrayLike, image: ArrayLike | None, camera: Camera, plan
         ImageError: mask or image does not fit the camera.
         ClothNotFoundError: the mask is empty.
         EstimationError: the region is no rectangle on the plane, or one of its sides is outside of the image.
+        InvalidInputError: it is larger than any cloth, as where camera and table are told in millimetres.
     """
     mask = check_mask(mask, camera)
     rgb = None if image is None else check_image(image, camera)
@@ -229,6 +232,7 @@ def rectangle_around(points: np.ndarray, camera: Camera, height: float, warnings
 
     Raises:
         EstimationError: a corner behind the camera.
+        InvalidInputError: as `fit_rectangle`.
     """
     middle = points.mean(axis=0)
     centre, size, angle = cv2.minAreaRect((points - middle).astype(np.float32))
@@ -257,6 +261,11 @@ def _labelled(pose: _Pose, camera: Camera, height: float, residual: float, warni
         swap = behind > ahead
     if swap:
         order = [order[0], order[3], order[2], order[1]]
+    if max(ahead, behind) > MAX_SIDE:
+        raise InvalidInputError(
+            f"the cloth would be {max(ahead, behind):.0f} x {min(ahead, behind):.0f} m: are the camera's place and the "
+            "table in metres?"
+        )
     corners = corners[order]
     along, across = corners[1] - corners[0], corners[3] - corners[0]
     return ClothRectangle(

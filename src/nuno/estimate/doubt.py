@@ -18,7 +18,7 @@ from nuno.camera.focal_of_rectangle import FOCAL
 from nuno.camera.rectangle import SQUARE, UNEVEN
 from nuno.estimate.hypotheses import Hypothesis
 from nuno.estimate.ranking import CONTOUR_WEIGHT, EVIDENCE, OVERLAP_WEIGHT, Comparison, Ranked, rank
-from nuno.estimate.seeing import AWAY, COVERED
+from nuno.estimate.seeing import AWAY, COVERED, OUTSIDE
 
 FAIRLY = 10.0
 """-log likelihood of a silhouette, without its pattern, up to which no other way of the hand is looked for."""
@@ -34,7 +34,7 @@ ELSEWHERE = "the image after looks as if the hand were "
 """How a warning begins that the hand is told to be where it is not."""
 SEEN_ELSEWHERE = "by where the cloth begins in the image after, the hand is taken to be "
 """The same where all guesses took it to be there (`nuno.estimate.hypotheses.elsewhere`)."""
-SHARES = {SQUARE: 0.0, UNEVEN: 0.0, POOR: 0.0, ELSEWHERE: 0.4, AWAY: 0.4, COVERED: 0.4, FOCAL: 0.1}
+SHARES = {SQUARE: 0.0, UNEVEN: 0.0, POOR: 0.0, ELSEWHERE: 0.4, AWAY: 0.4, COVERED: 0.4, OUTSIDE: 0.4, FOCAL: 0.1}
 """Of the broad probabilities, by how a warning begins, of what those before it left. A square or rough outline told
 nothing of answers (docs/reports/accuracy.md), and how badly the best future fits counts by itself."""
 WARNED_SHARE = 0.1

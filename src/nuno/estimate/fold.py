@@ -28,6 +28,7 @@ from nuno.estimate.hand_path import HandPath
 from nuno.estimate.hand_sight import disc, hands_seen
 from nuno.estimate.hypotheses import cell_counts
 from nuno.estimate.imagined_fold import ImaginedFold, imagine_fold
+from nuno.estimate.pick_settings import MAX_HAND_RADIUS, MAX_REST_HEIGHT, check_table
 from nuno.kernels.compile_watch import Stages, compiling_watched
 from nuno.materials import Cloth
 from nuno.plans.cpu_threads import core_count
@@ -131,11 +132,11 @@ def replay_fold(
     """
     stages = Stages("read", "see", "compile", "imagine", "segment", "compare")
     camera = camera if isinstance(camera, Camera) else Camera.from_dict(camera)
-    table = _table(table_height, table_half_extents, table_centre, table_thickness)
+    table = check_table(table_height, table_half_extents, table_centre, table_thickness)
     paths = _checked_hands(hands)
     times = _frame_times(frame_times, paths)
-    number("rest_height", rest_height, above=0.0)
-    number("hand_radius", hand_radius, low=0.0)
+    number("rest_height", rest_height, above=0.0, high=MAX_REST_HEIGHT)
+    number("hand_radius", hand_radius, low=0.0, high=MAX_HAND_RADIUS)
     named = _materials(materials, rest_height)
     count("cells", cells, low=4)
     count("substeps", substeps)
@@ -219,19 +220,6 @@ def overlap(imagined: np.ndarray, real: np.ndarray, ignored: np.ndarray) -> floa
     """Return intersection over union of two masks (h, w), 1 where both are empty; ``ignored`` pixels do not count."""
     either = (imagined | real) & ~ignored
     return float((imagined & real & ~ignored).sum() / either.sum()) if either.any() else 1.0
-
-
-def _table(height: Any, half_extents: Any, centre: Any, thickness: Any) -> Table:
-    def pair(name: str, value: Any) -> tuple[float, float] | None:
-        if value is None:
-            return None
-        a, b = finite_array(name, value, (2,))
-        return float(a), float(b)
-
-    return Table(
-        number("table_height", height), pair("table_half_extents", half_extents), pair("table_centre", centre),
-        number("table_thickness", thickness, above=0.0),
-    )  # fmt: skip
 
 
 def _checked_hands(hands: Any) -> tuple[HandPath, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,10 @@ from nuno.world.world import World
 
 MAX_HAND_STD = 0.2
 """[m] A hand that is known no better tells nothing of where a cloth hangs."""
+MAX_HAND_RADIUS = 1.0
+"""[m] Around a hand, of what hides the cloth."""
+MAX_REST_HEIGHT = 0.2
+"""[m] Of a cloth's middle surface above the table that it lies on."""
 MAX_CANDIDATES = 1024
 """Each is imagined several times, on a mesh with a vertex there: more would take hours, and memory that few have."""
 
@@ -79,8 +84,8 @@ class PickSettings:
 def check_settings(
     *, camera: Camera | Mapping[str, Any], table: Table, hand: ArrayLike, candidates: tuple[int, int] | ArrayLike,
     discretisations: Sequence[Discretisation], turns: Sequence[float], score: str, device: str, rest_height: float,
-    lift_seconds: float, sure: float | None, sideways: float | None, engine: str = "nuno", hand_std: float = HAND_STD,
-    hand_path: Any = None, **others: Any,
+    hand_radius: float, lift_seconds: float, sure: float | None, sideways: float | None, engine: str = "nuno",
+    hand_std: float = HAND_STD, hand_path: Any = None, **others: Any,
 ) -> PickSettings:  # fmt: skip
     """Check the arguments of `nuno.estimate_pick` that are no images.
 
@@ -100,7 +105,8 @@ def check_settings(
     hand = finite_array("hand", hand, (3,))
     _check_hand(camera, hand, table)
     labels, uv, grid = _candidates(candidates)
-    number("rest_height", rest_height, above=0.0)
+    number("rest_height", rest_height, above=0.0, high=MAX_REST_HEIGHT)
+    number("hand_radius", hand_radius, low=0.0, high=MAX_HAND_RADIUS)
     number("lift_seconds", lift_seconds, above=0.0, high=LONGEST_WAIT)
     if sure is not None:
         number("sure", sure, above=0.0, high=1.0)
@@ -119,7 +125,7 @@ def check_settings(
     path = None if hand_path is None else checked_path(hand_path, hand, hand_std)
     return PickSettings(
         camera=camera, table=table, hand=hand, labels=labels, uv=uv, grid=grid, rest_height=rest_height,
-        lift_seconds=lift_seconds, discretisations=discretisations, sure=sure,
+        hand_radius=hand_radius, lift_seconds=lift_seconds, discretisations=discretisations, sure=sure,
         turns=angles, poses=poses_of(camera, angles, hand_std if score in EVIDENCE else 0.0), hand_std=hand_std,
         hand_path=path, sideways=sideways, score=score,
         device=found_device(checked_device(device)), engine=engine, **others,
@@ -159,8 +165,9 @@ def _check_hand(camera: Camera, hand: np.ndarray, table: Table) -> None:
 
 def _candidates(candidates: Any) -> tuple[np.ndarray, np.ndarray, tuple[int, int]]:
     """Labels (k, 2), fractions (k, 2) of the sides, and the grid that the mesh's vertices should lie on."""
-    if isinstance(candidates, tuple) and len(candidates) == 2 and all(isinstance(c, int) for c in candidates):
-        n, m = candidates
+    is_pair = isinstance(candidates, tuple | list) and len(candidates) == 2
+    if is_pair and all(isinstance(c, Integral) for c in candidates):
+        n, m = (int(c) for c in candidates)
         if n < 2 or m < 2:
             raise InvalidInputError(f"a grid of candidates needs at least 2 x 2 points, got {n} x {m}")
         if n * m > MAX_CANDIDATES:

@@ -33,6 +33,10 @@ AWAY = "the cloth found in the image after begins "
 """How a warning begins that there is no cloth at the hand."""
 COVERED = "the image after shows cloth where the hand is told to be"
 """How a warning begins that there is no hand."""
+OUTSIDE = "the hand is told to be out of the image after"
+"""How a warning begins that the place of the hand is not seen."""
+CUT_SHARE = 0.05
+"""Share of the cloth's outline on the image's border from which it is told that the cloth goes on there."""
 HAND_MARGIN = 2
 """[px] of the full image around the hand that count neither as cloth nor as background."""
 
@@ -93,6 +97,7 @@ def begin_to_see(
                 after, camera, table, before, mask_before, hand, hand_radius=hand_radius, hidden=hidden
             )
         ignored = _hidden(camera, hand, hand_radius)
+        outside = _outside(mask, ignored, camera.project(hand))
         if hidden is not None:
             ignored |= hidden
         small, silhouette = _silhouette(mask, camera, ignored, IMAGE_SCALE)
@@ -104,7 +109,7 @@ def begin_to_see(
         away = _oddities(mask, ignored)
         covered = _uncovered(mask, ignored) if mask_after is None and hidden is None else ()
         hand_is = 1 if covered else -1 if away and _begins_below(mask, camera, hand) else 0
-        odd = away + _doubts(mask, doubt) + covered
+        odd = outside + away + _doubts(mask, doubt) + covered
         return Seen(mask, ignored, small, silhouette, coarse, pattern, odd, hand_is)
 
     if not meanwhile:
@@ -114,6 +119,35 @@ def begin_to_see(
     looking = thread.submit(look)
     thread.shutdown(wait=False)
     return looking.result
+
+
+def _outside(mask: np.ndarray, hand_pixels: np.ndarray, hand: np.ndarray) -> tuple[str, ...]:
+    """Warnings where the image after does not show the hand's pixels (h, w), or the cloth (h, w) goes on beyond it.
+
+    Args:
+        mask: (h, w) bool, the cloth.
+        hand_pixels: (h, w) bool.
+        hand: (2,) the pixel of the held point, wherever it is.
+    """
+    import cv2
+
+    found = []
+    height, width = mask.shape
+    if not hand_pixels.any():
+        found.append(
+            f"{OUTSIDE}, at pixel ({hand[0]:.0f}, {hand[1]:.0f}) of {width} x {height}: whether it is there and holds "
+            "the cloth is not seen; take the image with the hand in it"
+        )
+    outlines, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    if outlines:
+        outline = np.concatenate(outlines)[:, 0]
+        cut = float(((outline <= 0) | (outline >= (width - 1, height - 1))).any(axis=1).mean())
+        if cut >= CUT_SHARE:
+            found.append(
+                f"{cut:.0%} of the cloth's outline in the image after lies on the image's border: what is beyond it is "
+                "not compared; a camera farther away, or turned, sees all of it"
+            )
+    return tuple(found)
 
 
 def _oddities(mask: np.ndarray, ignored: np.ndarray) -> tuple[str, ...]:

@@ -101,10 +101,14 @@ def weigh(
     """
     grid, depth = seen.grid, image.depth
     hidden = seen.hidden
+    metres = None
     if seen.depth is not None:
         known = np.isfinite(seen.depth)
         with np.errstate(invalid="ignore"):
-            hidden = hidden | (~seen.cloth & (seen.depth < depth - IN_FRONT)) | (seen.cloth & ~known)
+            hidden = hidden | (~seen.cloth & (seen.depth < depth - IN_FRONT))
+        if (seen.cloth & known).any():  # a cloth of which no depth is known at all is seen by its mask
+            metres = seen.depth
+            hidden = hidden | (seen.cloth & ~known)
     model, cloth = image.seen & ~hidden, seen.cloth & ~hidden
     visible = np.zeros(len(vertices), dtype=bool)
     visible[faces[image.faces[model]].ravel()] = True
@@ -117,7 +121,7 @@ def weigh(
     if not model.any() or not cloth.any():
         evidence.cost += WORST * int(either.sum())
         return
-    lifted = _lift(depth, model, cloth) if seen.depth is None else seen.depth
+    lifted = _lift(depth, model, cloth) if metres is None else metres
     off = np.minimum(((lifted[common] - depth[common]) / DEPTH_NOISE) ** 2, WORST)
     evidence.cost += float(off.sum()) + WORST * int((either & ~common).sum())
 
@@ -135,7 +139,7 @@ def weigh(
         within = distance < reach
         pull += near.shares(points[within], observed[index[within]] - points[within])
     mean = pull / np.maximum(total, MIN_SUPPORT)[:, None]
-    rim, whole = _rims(image, grid, vertices, inwards, near, spacing, seen.depth is None)
+    rim, whole = _rims(image, grid, vertices, inwards, near, spacing, metres is None)
     # pixels beyond a rim, or missing before it, are as many as it is off: it has those of half a cell within
     share = np.maximum((support - own_support) / np.maximum(whole, MIN_SUPPORT), -1.0)
     mean -= 0.5 * spacing * share[:, None] * rim
@@ -145,7 +149,7 @@ def weigh(
     weight = np.minimum(total / MIN_SUPPORT, 1.0)
     across = rim / np.maximum(np.linalg.norm(rim, axis=1, keepdims=True), 1e-9)
     measured = across[:, :, None] * rim[:, None, :]
-    if seen.depth is not None:
+    if metres is not None:
         measured += normals[:, :, None] * normals[:, None, :]
     information = weight[:, None, None] * measured
     evidence.information += information

@@ -16,7 +16,7 @@ class Followed:
         vertices: (n, 3) float64 [m], where the cloth is then.
         visible: (n,) bool, which vertices the cameras see.
         used: Whether the image drew the cloth.
-        reason: Why it did not: "dropped", "late", "empty", "hidden" or "lost"; None where it did.
+        reason: Why it did not: "dropped", "late", "instant", "empty", "hidden" or "lost"; None where it did.
         points: How many pixels showed the cloth.
         error: Mean length of the residuals that are left of the visible vertices [m]; NaN where none are.
         agreement: Intersection over union of the pixels that show the cloth and those that should; NaN likewise.

@@ -37,11 +37,11 @@ class FollowedFutures:
         self.held = np.zeros(1, dtype=bool)
 
     def bring(self) -> bool:
-        """Make the futures start from what the world is now; return whether they were made anew."""
+        """Make the futures start from what the world is now; return whether the cloth is where they left it."""
         now = self._world.save()
         if self._seen is not None and _same_but_places(now, self._seen):
             self._move_statics(now, self._seen)
-            return False
+            return True
         kept = None
         if self._seen is not None and _same_state(now, self._seen, self._body.key):
             state = self.worlds.state(self.body)
@@ -61,7 +61,7 @@ class FollowedFutures:
             corners = getattr(spec, "corners", None) if corners is None else corners
             if grip.body == self._body.key and corners is not None:
                 self.held[corners[corners >= 0]] = True
-        return True
+        return kept is not None
 
     def forget(self) -> None:
         """Make the futures anew at the next image: something went wrong amidst a run."""

@@ -21,10 +21,10 @@ from nuno.tracking.followed_futures import FollowedFutures
 from nuno.tracking.observation import (
     Observation,
     check_depth,
-    check_picture,
     checked_cameras,
     is_picture,
     observe,
+    observe_picture,
 )
 from nuno.tracking.pixel_grid import PixelGrid
 from nuno.tracking.pulling import LEAK, STEADIEST, STEADY, STUCK, gain, limited, phases
@@ -171,7 +171,8 @@ class Follower:
 
     def _advance(self, when: float, grids: list[PixelGrid], shown: list[Any]) -> Followed:
         """Let the futures pass until an image's time, drawn by it, and adopt the likeliest."""
-        self._futures.bring()
+        if not self._futures.bring():
+            self._steady[:] = 0.0  # it drew the cloth from where it no more is
         worlds, body = self._futures.worlds, self._futures.body
         before = when - LONGEST
         if before > worlds.time + SOON:
@@ -188,15 +189,17 @@ class Follower:
         views = [each for each in seen_now if each is not None]
         others = [depth_of_others(worlds, body, each.grid) for each in views]
         evidence = self._weigh(views, others) if views else self._nothing()
-        reason = self._reason(views, evidence)
+        reason = self._reason(views, evidence, span)
         forces = self._steady.copy()
-        if reason is None and span > SOON:
+        if reason is None:
             forces, evidence = self._draw(anchor, span, views, others, evidence)
-        elif reason is not None and self._steady.any():  # nothing was seen: what drew the cloth before ends
+        elif span <= SOON:
+            forces = np.zeros_like(forces)
+        elif self._steady.any():  # nothing was seen: what drew the cloth before ends
             self._steady[:] = forces[:] = 0.0
             worlds.restore(anchor)
             worlds.run(span, progress=False)
-        self._judge(span, evidence if reason in (None, "lost") else None)
+        self._judge(span, evidence if reason in (None, "lost", "instant") else None)
         self._futures.adopt(self._adopted)
         self._last = when
         return self._result(when, reason is None, reason, evidence, forces)
@@ -237,7 +240,7 @@ class Follower:
                 check_depth(depth, grid.full)
             return None, None, None
         if is_picture(seen):
-            return check_picture(seen, grid.full), depth, observe(grid, np.zeros(seen.shape[:2], bool), depth, hidden)
+            return seen, depth, observe_picture(grid, seen, depth, hidden)
         return seen, depth, observe(grid, seen, depth, hidden)
 
     def _observed(self, k: int, grid: PixelGrid, seen: Any, depth: Any, known: Any) -> Observation | None:
@@ -274,8 +277,8 @@ class Follower:
                 )  # fmt: skip
         return found
 
-    def _reason(self, views: list[Observation], evidence: list[Evidence]) -> str | None:
-        """Return why the images cannot draw the cloth, None where they can."""
+    def _reason(self, views: list[Observation], evidence: list[Evidence], span: float) -> str | None:
+        """Return why the images of ``span`` [s] after the world's time cannot draw the cloth, None where they can."""
         own = evidence[self._adopted]
         if not views:
             return "dropped"
@@ -289,7 +292,14 @@ class Follower:
             self._wider = min(self._wider * WIDEN, FARTHEST)
             return "lost" if not own.expected else None
         self._wider = 1.0
-        return None
+        if span > SOON:
+            return None
+        if np.isfinite(self._last):  # a first image of the world's time is as good a beginning as any
+            self._tell(
+                "instant", "an image of the time at which the world is already draws nothing, for no time passes; "
+                "let followers of one world take images of different times, by turns"
+            )  # fmt: skip
+        return "instant"
 
     def _tell(self, what: str, text: str) -> None:
         if what not in self._warned:

@@ -16,6 +16,8 @@ from nuno.validation import as_array
 
 FARTHEST = 50.0
 """[m] A cloth that is farther away than this by the median of its depths is most likely given in millimetres."""
+NEARER = 0.02
+"""Share of an image's known depths that are nearer than `FARTHEST` where it shows a cloth at all, by metres."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,9 +47,19 @@ def is_picture(seen: Any) -> bool:
     return as_array("seen", seen, ImageError).ndim == 3
 
 
-def check_picture(seen: Any, camera: Camera) -> np.ndarray:
-    """Return a colour image (height, width, 3) uint8, checked against its camera."""
-    return check_image(seen, camera, "image")
+def observe_picture(grid: PixelGrid, image: Any, depth: Any, hidden: Any) -> Observation:
+    """Return what a camera shows in a colour image (height, width, 3) uint8, in which the cloth is not found yet.
+
+    Raises:
+        ImageError: as `observe`.
+    """
+    check_image(image, grid.full, "image")
+    found = observe(grid, np.zeros(image.shape[:2], dtype=bool), depth, hidden)
+    if found.depth is not None and np.isfinite(found.depth).any():
+        nearest = float(np.nanquantile(found.depth, NEARER))
+        if nearest > FARTHEST:
+            raise ImageError(f"depth is {nearest:.0f} m where it is nearest; it is to be metres, not millimetres")
+    return found
 
 
 def observe(grid: PixelGrid, mask: Any, depth: Any, hidden: Any) -> Observation:

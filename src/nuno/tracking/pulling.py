@@ -22,14 +22,19 @@ STRONGEST = 60.0
 
 
 def phases(span: float, frame: float) -> list[tuple[float, float]]:
-    """Return durations [s] and accelerations [1/s2] that displace what is free by 1 within ``span`` [s]."""
+    """Return durations [s] and accelerations [1/s2] that displace what is free by 1 within ``span`` [s].
+
+    The first part is half of the span's frames, so the second may be up to twice as long, or more: the weaker it
+    brakes, for it takes away a share of the velocity, and what it took too much would go the other way.
+    """
     frames = int(np.floor(span / frame + 1e-6))
     if frames < 2:
         return [(span, 2.0 / span**2)]
     first = (frames // 2) * frame
     second = span - first
-    way = 0.5 * first**2 + first * second - 0.5 * BRAKE * second**2
-    return [(first, 1.0 / way), (second, -BRAKE / way)]
+    brake = BRAKE * (first / second)
+    way = 0.5 * first**2 + first * second - 0.5 * brake * second**2
+    return [(first, 1.0 / way), (second, -brake / way)]
 
 
 def gain(span: float) -> float:
