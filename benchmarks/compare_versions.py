@@ -111,6 +111,18 @@ def box_on_towel(device: str) -> tuple[Any, float]:
     return world, 2.0
 
 
+def two_towels(device: str) -> tuple[Any, float]:
+    """Two towels at rest on each other on a table, 0.5 s."""
+    import nuno
+
+    world = nuno.World(device=device)
+    world.add(nuno.box((1.0, 1.0, 0.02), position=(0, 0, -0.01)))
+    for k in range(2):
+        place = (0.003 * k, 0.002 * k, 0.003 + 0.005 * k)
+        world.attach(world.add(nuno.sheet((0.3, 0.2), cells=(24, 16), position=place)))
+    return world, 0.5
+
+
 def standing_robots(device: str) -> tuple[Any, float]:
     """64 worlds of Talos with dynamics, whose arms move, before a table with a towel, 0.25 s."""
     from imagined_robots import begin, room
@@ -141,7 +153,17 @@ class _Ticks:
 
 SCENES: dict[str, Callable[[str], tuple[Any, float]]] = {
     made.__name__: made
-    for made in (picks, picks_by_rule, hang, softcube, boxes, box_on_towel, standing_robots, kinematic_robot)
+    for made in (
+        picks,
+        picks_by_rule,
+        hang,
+        softcube,
+        boxes,
+        box_on_towel,
+        two_towels,
+        standing_robots,
+        kinematic_robot,
+    )
 }
 
 

@@ -504,3 +504,20 @@ def test_copies_have_the_same_bits(where):
     world.run(0.2, progress=False)
     for body, places in zip(bodies, expected, strict=True):
         assert np.array_equal(body.vertices, places)
+
+
+def test_two_towels_lie_still_on_each_other():
+    """The upper one a thickness above the lower, within what passes leave of gaps; the table bears both."""
+    world = nuno.World(device="cpu")
+    table(world)
+    lower = towel(world)
+    upper = towel(world, height=0.0065, name="upper")
+    for body in (lower, upper):
+        world.sum_impulses(body)
+    world.run(0.3, progress=False)
+    start = upper.vertices
+    world.run(0.5, progress=False)
+    assert np.abs(upper.vertices - start).max() < 1e-6  # [m]
+    np.testing.assert_allclose(upper.vertices[:, 2] - lower.vertices[:, 2], THICK, atol=1e-6)
+    weight = 2 * 0.2 * 0.16 * 0.16 * G
+    assert borne(world, lower, "table")[2] == pytest.approx(weight, rel=0.01)
