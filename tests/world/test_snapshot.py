@@ -133,7 +133,7 @@ def test_files_that_cannot_be_read(tmp_path):
     with np.load(path) as file:
         arrays = dict(file)
     header = json.loads(str(arrays["header"]))
-    assert header["format"] == 5 and header["units"]["length"] == "m" and len(header["meshes"]) == 5
+    assert header["format"] == 6 and header["units"]["length"] == "m" and len(header["meshes"]) == 5
 
     def variant(name, **changes):
         changed = {**arrays, "header": np.array(json.dumps({**header, **changes}))}

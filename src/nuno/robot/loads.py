@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -39,6 +39,23 @@ class Load:
     point: np.ndarray
     force: np.ndarray
     torque: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class BodyLoads:
+    """The loads of one body on links in a frame.
+
+    Attributes:
+        body: Its key.
+        grips: Keys of the grips that held it.
+        loads: All of them; what grips and contacts do may be in one.
+        contacts: Those of its contacts, as far as they are known by themselves.
+    """
+
+    body: str
+    grips: tuple[str, ...]
+    loads: tuple[Load, ...]
+    contacts: tuple[Load, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +103,7 @@ class LinkLoads:
         self._joints = links.joints
         self._read_at: tuple[float, tuple[str, ...]] | None = None
         self._version: int | None = None
+        self._of_bodies: dict[Body, tuple[Load, ...]] = {}
         self._loads: tuple[Load, ...] = ()
         self._motions: dict[Body, _Motion] = {}
         self._noted: dict[Body, _Motion] = {}
@@ -101,7 +119,8 @@ class LinkLoads:
             moving = self._moving()
             now = (world.time, tuple(grip.key for own in moving.values() for grip in self._grips_of(own)))
             if now != self._read_at:
-                self._loads = tuple(load for body, dynamics in moving.items() for load in self._of(body, dynamics))
+                self._of_bodies = {body: tuple(self._of(body, dynamics)) for body, dynamics in moving.items()}
+                self._loads = tuple(load for own in self._of_bodies.values() for load in own)
                 self._reader.keep_only(list(moving))
                 of_bodies: tuple[dict[Body, Any], ...] = (self._motions, self._contacts)
                 for kept in of_bodies:
@@ -109,6 +128,50 @@ class LinkLoads:
                         del kept[body]
                 self._read_at = now
         return self._loads
+
+    def of_bodies(self) -> list[BodyLoads]:
+        """Return the same by the body that does it."""
+        self.read()
+        return [
+            BodyLoads(body.key, self._grip_keys(body), loads, tuple(self._contacts.get(body, ())))
+            for body, loads in self._of_bodies.items() if loads
+        ]  # fmt: skip
+
+    def of_now(self, before: BodyLoads) -> tuple[Load, ...]:
+        """Return the loads of a body in the last frame, less those of grips that have let go since."""
+        body = self._world._bodies.get(before.body)
+        if body is None or not body.is_dynamic:
+            return ()
+        held = self._grip_keys(body)
+        if all(key in held for key in before.grips):
+            return before.loads
+        dynamics: Any = dynamics_of(body)
+        particles = isinstance(dynamics, ParticleDynamics)
+        x = self._reader.rows(body, dynamics.solver, self._k)[:3] if particles else self._reader.places(body, self._k)
+        kept = [grip for grip in self._grips_of(dynamics) if grip.key in before.grips and grip.target in self._index]
+        return (*(self._of_grip(grip, x) for grip in kept), *before.contacts)
+
+    def _of_grip(self, grip: Grip, x: np.ndarray) -> Load:
+        """Return what a grip bears of a body whose vertices are at x (3, n) [m]."""
+        force, torque = self._reader.wrench(grip, self._k)
+        assert grip.target is not None
+        return Load(self._index[grip.target], held_points(grip, self._k, x.T).mean(axis=0), force, torque)
+
+    def _grip_keys(self, body: Body) -> tuple[str, ...]:
+        return tuple(grip.key for grip in self._grips_of(dynamics_of(body)))
+
+    def save(self) -> dict[str, Any]:
+        """Return how bodies moved in the last frame, by their keys, as far as the next reading may count on it."""
+        with self._world.lock:
+            self._follow()
+            return {body.key: motion for body, motion in self._motions.items()}
+
+    def load(self, saved: Mapping[str, Any]) -> None:
+        """Go on from what ``save`` returned when the world was as it is now."""
+        self.forget()
+        self._follow()
+        known = {body.key: body for body in self._world._bodies.values()}
+        self._motions.update({known[key]: motion for key, motion in saved.items() if key in known})
 
     def note(self) -> None:
         """Take note of how bodies move now, for a reading in the next frame; what bears on links is not worked out."""
