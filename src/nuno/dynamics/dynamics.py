@@ -278,6 +278,10 @@ class ParticleDynamics(Dynamics):
             self.solver.set_forces(np.sum([p.force for p in pushing], axis=0) if pushing else None)
             self._pushing = pushing
 
+    def is_prepared(self, time: float) -> bool:
+        """Return True if the same grips and pushes act from ``time`` [s] on as in the last run."""
+        return not self.grips_changed and self.pushing(time) == self._pushing
+
     def shape_impulses(self) -> dict[str, np.ndarray]:
         """Return what static bodies gave this one in the last frame, (worlds, 3) [N s], by key, where it is summed."""
         return {} if self.solver.sums is None else dict(self.solver.sums.given())

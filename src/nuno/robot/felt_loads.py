@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from nuno.robot.loads import BodyLoads, LinkLoads, Load
 
@@ -30,47 +30,37 @@ class FeltLoads:
     ) -> None:  # fmt: skip
         self._world = links.world if reader is None else reader.world
         self._loads = LinkLoads(links, reader=reader, bodies=bodies, index=index)
-        self._kept: tuple[float, list[BodyLoads]] | None = None  # when they were read [s]
+        self._kept: tuple[float, tuple[BodyLoads, ...]] | None = None  # when they were read [s]
 
     def begin(self) -> None:
         """Begin to feel: read what bears now, where that is not known."""
         if not self._is_of_now():
-            self._loads.forget()
+            self._loads.note()  # so that nothing from before counts
             self.take()
 
     def take(self) -> None:
         """Read what bore on the links in the frame that ends."""
         moving = any(own.is_dynamic for own in self._world.bodies)
-        self._kept = self._world.time, self._loads.of_bodies() if moving else []
+        self._kept = self._world.time, tuple(self._loads.of_frame()) if moving else ()
 
     def read(self) -> list[Load]:
-        """Return the loads of the frame that has ended, less those of what has let go since."""
+        """Return the loads of the frame that has ended, less those of what has let go since, as another begins."""
         self.begin()
+        self._loads.note()
         assert self._kept is not None
         return [load for own in self._kept[1] for load in self._loads.of_now(own)]
-
-    def changed(self) -> None:
-        """Be told that something is held otherwise in this world than in the frame before."""
-        self._loads.forget()
 
     def forget(self) -> None:
         """Forget what was, as in a world that is another now."""
         self._kept = None
 
-    def save(self) -> Any:
+    def save(self) -> tuple[BodyLoads, ...] | None:
         """Return what is kept of the frame that has ended, for ``load``; None where nothing is felt."""
-        if not self._is_of_now():
-            return None
-        assert self._kept is not None
-        return self._kept[1], self._loads.save()
+        return self._kept[1] if self._kept is not None and self._is_of_now() else None
 
-    def load(self, saved: Any) -> None:
+    def load(self, saved: tuple[BodyLoads, ...] | None) -> None:
         """Go on from what was kept when the world was as it is now."""
-        self._kept = None
-        if saved is not None:
-            loads, motions = saved
-            self._kept = self._world.time, loads
-            self._loads.load(motions)
+        self._kept = None if saved is None else (self._world.time, saved)
 
     def _is_of_now(self) -> bool:
         return self._kept is not None and self._kept[0] == self._world.time

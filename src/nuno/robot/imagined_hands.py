@@ -22,7 +22,6 @@ from nuno.world.grips_of_worlds import drop_empty_grips, grips_by_key
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
     from nuno.robot.balance import Balance
-    from nuno.robot.imagined_loads import ImaginedLoads
     from nuno.robot.imagined_sensors import ImaginedSensors
     from nuno.robot.motion_batch import MotionBatch
     from nuno.robot.robot_state import RobotState
@@ -52,7 +51,6 @@ class ImaginedHands:
     _links: list[Body]
     _together: MotionBatch
     _sensors: ImaginedSensors | None
-    _loads: ImaginedLoads | None
     _chosen_worlds: Callable[[Any], list[int]]
 
     hands: dict[str, HandCopies]
@@ -193,8 +191,6 @@ class ImaginedHands:
         rigid = self.hands[name].settle()
         if rigid.any() and self._sensors is not None:
             self._sensors.forget(rigid)
-        if rigid.any() and self._loads is not None:
-            self._loads.changed(rigid)
 
     def _hands_ahead(self, count: int) -> int:
         """Return in how many of the next frames no hand does anything but in the last."""

@@ -58,11 +58,6 @@ class ImaginedLoads:
         pin.forwardKinematics(self._links.robot.model, self._data, q)
         return external_forces(self._links, loads, self._data.oMi)
 
-    def changed(self, worlds: np.ndarray) -> None:
-        """Be told that in some worlds (worlds,) bool something is held otherwise than before."""
-        for k in np.flatnonzero(worlds).tolist():
-            self._of_worlds[k].changed()
-
     def save(self) -> list[Any]:
         """Return of each world what is kept of the frame that has ended, for ``load``."""
         return [own.save() for own in self._of_worlds]

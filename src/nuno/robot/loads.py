@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -129,13 +129,20 @@ class LinkLoads:
                 self._read_at = now
         return self._loads
 
-    def of_bodies(self) -> list[BodyLoads]:
-        """Return the same by the body that does it."""
-        self.read()
-        return [
-            BodyLoads(body.key, self._grip_keys(body), loads, tuple(self._contacts.get(body, ())))
-            for body, loads in self._of_bodies.items() if loads
-        ]  # fmt: skip
+    def of_frame(self) -> list[BodyLoads]:
+        """Return the loads of the frame that began with ``note`` by the body that does it.
+
+        So they depend on nothing from before that frame.
+        """
+        with self._world.lock:
+            self._version, self._read_at = self._world._collider_version, None
+            self._motions.clear()
+            self._contacts.clear()
+            self.read()
+            return [
+                BodyLoads(body.key, self._grip_keys(body), loads, tuple(self._contacts.get(body, ())))
+                for body, loads in self._of_bodies.items() if loads
+            ]  # fmt: skip
 
     def of_now(self, before: BodyLoads) -> tuple[Load, ...]:
         """Return the loads of a body in the last frame, less those of grips that have let go since."""
@@ -159,19 +166,6 @@ class LinkLoads:
 
     def _grip_keys(self, body: Body) -> tuple[str, ...]:
         return tuple(grip.key for grip in self._grips_of(dynamics_of(body)))
-
-    def save(self) -> dict[str, Any]:
-        """Return how bodies moved in the last frame, by their keys, as far as the next reading may count on it."""
-        with self._world.lock:
-            self._follow()
-            return {body.key: motion for body, motion in self._motions.items()}
-
-    def load(self, saved: Mapping[str, Any]) -> None:
-        """Go on from what ``save`` returned when the world was as it is now."""
-        self.forget()
-        self._follow()
-        known = {body.key: body for body in self._world._bodies.values()}
-        self._motions.update({known[key]: motion for key, motion in saved.items() if key in known})
 
     def note(self) -> None:
         """Take note of how bodies move now, for a reading in the next frame; what bears on links is not worked out."""

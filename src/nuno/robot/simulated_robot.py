@@ -372,7 +372,6 @@ class SimulatedRobot(SimulatedBase):
                 grips = grips_by_key(self.world)
                 for name, gripper in self.grippers.items():
                     gripper.take_over(copied[name], goals, grips)
-                self._felt.load(felt)  # what hands hold now is as it was there
 
     def future_commands(self, futures: World, k: int) -> Callable[[], None]:
         """Return what lets the robot do from now on what its copy in one world of a batch was told to."""

@@ -77,7 +77,8 @@ def apply(snapshot: Snapshot, world: Advancing) -> None:
         raise
     _take_apart(world, list(made.values()))
     world._time, world._clock_shift = snapshot.time, snapshot.clock_shift
-    world._stepping.last = []  # what contacts and ties gave in the last frame was in another past
+    # what contacts and ties gave in the last frame, and the ways of what led, were in another past
+    world._stepping.last, world._schedule = [], None
     for record in snapshot.bodies:
         _set_up(bodies[record.key], record)
         world._register(bodies[record.key])
