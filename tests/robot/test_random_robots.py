@@ -27,7 +27,7 @@ def servo(robot, random):
 
 def drop(robot, random):
     """Let the cube or the towel fall on the palm."""
-    place = robot.actual.frame_pose("right_hand").position + (*random.uniform(-0.01, 0.01, 2), 0.15)
+    place = robot.actual.frame_pose("right_hand").position + np.append(random.uniform(-0.01, 0.01, 2), 0.15)
     robot.world.find(("cube", "towel")[random.integers(2)]).locate(place)
 
 

@@ -79,7 +79,7 @@ class Grip:
         # of a rigid body with a static leader: when a frame began [s], and where it was led from and to in that frame;
         # not a number in worlds of a batch where it was not led yet
         self.followed: tuple[float, Pose, Pose] | None = None
-        # when it was restored [s], and what it bore in the frame before that, (worlds, 6) [N, N m]; it counts until then
+        # when it was restored [s], and what it bore in the frame before, (worlds, 6) [N, N m]
         self.borne: tuple[float, np.ndarray] | None = None
         self._world: GripWorld | None = None
         self.unmet_frames = 0  # in so many frames one after the other it was not met; -1: that was told
