@@ -72,7 +72,7 @@ def _coupled(world: BuiltinWorld) -> list[Any]:
 
 def _prepare(world: BuiltinWorld, dynamics: ParticleDynamics) -> None:
     """Bring what acts on a body where it has changed, and leave the ways on which grips are led as they are."""
-    if dynamics.is_prepared(world.time):
+    if not dynamics.grips_changed and dynamics.pushing(world.time) == dynamics.acting:
         return
     ways = [(grip, grip.spec) for grip in dynamics.grips]
     dynamics.prepare(world.time, 1.0 / world.frame_rate)
