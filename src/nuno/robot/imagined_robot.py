@@ -117,6 +117,7 @@ class ImaginedRobot(ImaginedBase, ImaginedHands):
             own.load(motion)
             goals.append(own.disown())
             own.gait.plans, own.gait.bears = original.gait.plans, partial(self._carried, k)
+            own.gait.gravity = lambda: self.world.gravity
             for name, controller in own.joints.controllers.items():
                 controller.near = original.joints.controllers[name].near
             self._motions.append(own)

@@ -135,9 +135,10 @@ class LinkLoads:
         So they depend on nothing from before that frame.
         """
         with self._world.lock:
-            self._version, self._read_at = self._world._collider_version, None
-            self._motions.clear()
-            self._contacts.clear()
+            noted = self._noted
+            self.forget()
+            self._follow()
+            self._noted = noted
             self.read()
             return [
                 BodyLoads(body.key, self._grip_keys(body), loads, tuple(self._contacts.get(body, ())))
@@ -146,13 +147,13 @@ class LinkLoads:
 
     def of_now(self, before: BodyLoads) -> tuple[Load, ...]:
         """Return the loads of a body in the last frame, less those of grips that have let go since."""
-        body = self._world._bodies.get(before.body)
-        if body is None or not body.is_dynamic:
+        found = [(body, dynamics) for body, dynamics in self._moving().items() if body.key == before.body]
+        if not found:
             return ()
+        body, dynamics = found[0]
         held = self._grip_keys(body)
         if all(key in held for key in before.grips):
             return before.loads
-        dynamics: Any = dynamics_of(body)
         particles = isinstance(dynamics, ParticleDynamics)
         x = self._reader.rows(body, dynamics.solver, self._k)[:3] if particles else self._reader.places(body, self._k)
         kept = [grip for grip in self._grips_of(dynamics) if grip.key in before.grips and grip.target in self._index]
@@ -185,12 +186,11 @@ class LinkLoads:
         version = self._world._collider_version
         if version != self._version:
             self._version, self._read_at = version, None
-            for kept in (self._motions, self._noted, self._contacts):
-                kept.clear()
+            self._motions, self._noted, self._contacts = {}, {}, {}
 
     def _moving(self) -> dict[Body, Any]:
         """Return all bodies with dynamics but the links, and their dynamics."""
-        bodies = [body for body in self._world._bodies.values() if body.is_dynamic and body not in self._index]
+        bodies = [body for body in self._world.bodies if body.is_dynamic and body not in self._index]
         return {body: dynamics_of(body) for body in bodies}
 
     def _grips_of(self, dynamics: Any) -> list[Grip]:

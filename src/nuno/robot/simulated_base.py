@@ -38,7 +38,7 @@ class SimulatedBase(SimulatedBody):
                 self.gait.change(goal, x, y, yaw, seconds)
                 return goal
             standing, load = self.wanted.copy(), self._carried()
-        walk = self.gait.plans.plan(standing, x, y, yaw, seconds, load)  # the world goes on meanwhile
+        walk = self.gait.plans.plan(standing, x, y, yaw, seconds, load, gravity)  # the world goes on meanwhile
         with self.world.lock:
             if self.gait.is_walking:
                 goal.finish(GoalStatus.REJECTED, text="another walk was begun meanwhile")

@@ -111,6 +111,7 @@ class SimulatedRobot(SimulatedBase):
         self._cameras = SimulatedCameras(self.links, cameras)
         self._felt = FeltLoads(self.links)
         self.guard, self._burden = MotionGuard(self.links, collisions), Burden(self.actual, self.links)
+        self.gait.gravity = lambda: self.world.gravity
         self.gait.looks, self.gait.bears = self.guard.velocities_of(self._motion), self._carried
         self._servo: Servo | None = None
         self._before: RobotState | None = None  # its state when the frame began

@@ -156,7 +156,7 @@ def _body_record(body: Body, world: Simulation, neutral: bool = False) -> BodyRe
 def _grip_record(grip: Grip, world: Simulation, neutral: bool) -> GripRecord:
     target, borne = None if grip.target is None else grip.target.key, None
     if world.engine.is_builtin and not neutral and not isinstance(grip, Joint):
-        borne = np.concatenate(world._wrench(grip), axis=-1)
+        borne = np.atleast_2d(np.concatenate(grip.wrench, axis=-1))
     return GripRecord(grip.key, grip.body.key, grip.spec, target, grip.offsets, grip.followed, borne)
 
 
