@@ -166,8 +166,8 @@ class Gait:
 
     def planned(self, x: float, y: float, yaw: float, seconds: float | None) -> Walk | str:
         """Return the walk on which ``go`` sets off from standing, or why there is none; nothing changes."""
-        bears = None if self.bears is None else self.bears()
-        return self.plans.plan(self._robot, x, y, yaw, seconds, bears, self.gravity())
+        load = self.bears() if self.bears else None
+        return self.plans.plan(self._robot, x, y, yaw, seconds, load, self.gravity())
 
     def begin(self, walk: Walk | RunningWalk | str, goal: Goal) -> None:
         """Set off on a walk that was planned, or reject the goal where there is none."""
@@ -345,8 +345,7 @@ class Gait:
             return
         (goal, place), self._waiting = self._waiting, None
         x, y, yaw = standing_place(self._robot)
-        forward, left = place[0] - x, place[1] - y
-        c, s = math.cos(yaw), math.sin(yaw)
+        forward, left, c, s = place[0] - x, place[1] - y, math.cos(yaw), math.sin(yaw)
         ahead = (c * forward + s * left, c * left - s * forward, place[2] - yaw)
         self.begin(self.plans.plan(self._robot, *ahead, None, gravity=self.gravity()), goal)
 
