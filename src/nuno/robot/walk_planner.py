@@ -16,7 +16,7 @@ from nuno.robot.footsteps import SOLE_GAP, Footstep, sole_gap
 from nuno.robot.gravity import EARTH, take_gravity, walking_gravity
 from nuno.robot.leg_motion import LegMotion, Targets
 from nuno.robot.pinocchio import pin
-from nuno.robot.preview_control import TICK, PreviewControl
+from nuno.robot.preview_control import GRAVITY, HORIZON, TICK, PreviewControl
 from nuno.robot.stride import Stride, two_feet
 from nuno.robot.timeline import Schedule, Timeline, smooth, timeline
 from nuno.robot.trajectory import JointTrajectory, Spline
@@ -91,7 +91,8 @@ class WalkPlanner:
         self._base = turn @ pin.Quaternion(self.start[3:7]).toRotationMatrix()  # as it is, seen from the feet
         self.centre = np.array(pin.centerOfMass(model, data, self.start))
         self._stand_nominally(data)
-        self.control = PreviewControl(self.height, gravity=pull)
+        # a slower pendulum must know more of what comes
+        self.control = PreviewControl(self.height, TICK, HORIZON * float(np.sqrt(GRAVITY / pull)), pull)
         self.lead = max(1, round(self.stride.shift / TICK))
 
     def __getstate__(self) -> dict[str, Any]:
