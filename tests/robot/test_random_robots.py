@@ -5,11 +5,41 @@ import pytest
 from lifter import lifter_in
 
 import nuno
+from nuno.world.grips_of_worlds import grips_by_key
 
 OPERATIONS = 8
 """Of a sequence: enough that a hand that closes is told something else on the way."""
 AHEAD = 0.25
 """[s] In which copies are compared: a hand closes within 0.2 s."""
+
+
+def send(copies, robot, heights):
+    """Send the palms of copies elsewhere, unless a servo law moves them."""
+    if robot._servo is None:
+        copies.angle_vector({"lift": heights}, 0.2)
+
+
+def servo(robot, random):
+    """Put the slide under a servo law, soft enough that it feels what it bears, or give it back."""
+    command = nuno.ServoCommand(("lift",), random.uniform(0.0, 0.1), kp=random.uniform(100.0, 1000.0), kd=20.0)
+    robot.servo(command if random.integers(4) else None)
+
+
+def drop(robot, random):
+    """Let the cube or the towel fall on the palm."""
+    place = robot.actual.frame_pose("right_hand").position + np.append(random.uniform(-0.01, 0.01, 2), 0.15)
+    robot.world.find(("cube", "towel")[random.integers(2)]).locate(place)
+
+
+def hang(robot, random):
+    """Let the program grip the towel or the cube to the palm, or let go what it gripped so."""
+    bodies, name = robot.links.bodies, ("cube", "towel")[random.integers(2)]
+    grips = [grip for grip in grips_by_key(robot.world).values() if grip.body.name == name]
+    if grips:
+        grips[0].release()
+    else:
+        palm = next(own for own in bodies if "palm" in own.name)
+        robot.world.grip(name, [0, 4] if name == "towel" else None, to=palm)
 
 
 def lift(robot, random):
@@ -74,7 +104,7 @@ def go_back(robot, random):
 def adopt(robot, random):
     """Become one of two futures, whose palms go to different places, and whose hands may close or open there."""
     futures = robot.world.imagine(2)
-    futures.robot.angle_vector({"lift": random.uniform(0.0, 0.1, 2)}, 0.2)
+    send(futures.robot, robot, random.uniform(0.0, 0.1, 2))
     futures.robot.move_gripper("rarm", random.integers(0, 2, 2), effort=random.uniform(2.0, 40.0))
     futures.run(random.choice([0.0, 0.35]))
     futures.run(0.05)
@@ -86,13 +116,14 @@ def adopt_commands(robot, random):
     futures = robot.world.imagine(2)
     futures.run(0.05)
     futures.robot.move_gripper("rarm", random.integers(0, 2, 2))
-    futures.robot.angle_vector({"lift": random.uniform(0.0, 0.1, 2)}, 0.1)
+    send(futures.robot, robot, random.uniform(0.0, 0.1, 2))
     futures.run(0.05)
     robot.world.adopt(futures, int(random.integers(2)), only="commands")
 
 
 CHOICES = (
-    lift, sequence, close, close, open_hand, stop, push, put, change, run, run, go_back, adopt, adopt_commands, opened
+    lift, sequence, close, close, open_hand, stop, push, put, change, run, run, go_back, adopt, adopt_commands, opened,
+    servo, servo, drop, hang,
 )  # fmt: skip
 
 
@@ -155,7 +186,7 @@ def check(seed, folder, kind):
     world.restore(saved)
     futures = world.imagine(2)
     heights, grasps, effort = random.uniform(0.0, 0.1, 2), random.integers(0, 2, 2), random.uniform(2.0, 40.0)
-    futures.robot.angle_vector({"lift": heights}, 0.2)
+    send(futures.robot, robot, heights)
     futures.run(AHEAD)
     futures.robot.move_gripper("rarm", grasps, effort)
     futures.run(AHEAD)
@@ -169,7 +200,7 @@ def check(seed, folder, kind):
 
     # the same as by its driver: what it is told, and what it grips
     world.restore(saved)
-    robot.angle_vector({"lift": heights[0]}, 0.2)
+    send(robot, robot, heights[0])
     world.run(AHEAD)
     robot.move_gripper("rarm", float(grasps[0]), effort, wait=False)
     world.run(AHEAD)

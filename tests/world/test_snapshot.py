@@ -7,6 +7,7 @@ import pytest
 
 import nuno
 from nuno import BodyStateError, Cloth, FileFormatError, InvalidInputError, Path, SurfacePoints
+from nuno.world.grips_of_worlds import grips_by_key
 
 
 def room():
@@ -124,6 +125,35 @@ def test_a_file_of_another_process_finds_its_bodies_by_name_and_shape(tmp_path):
     assert len(other.save().ignored) == len(other.save().pair_friction) == 1
 
 
+def test_what_grips_bore_is_in_files_and_copies(tmp_path):
+    """A grip tells of the last frame before a world was saved, read or imagined; a file of format 5 says nothing."""
+    world = nuno.World(device="cpu")
+    towel = world.add(nuno.sheet((0.2, 0.2), cells=(4, 4), name="towel", position=(0, 0, 1)))
+    world.attach(towel)
+    grip = world.grip(towel, [0, 4], to=towel.vertices[[0, 4]].mean(axis=0))
+    world.run(0.2)
+    borne = np.concatenate(grip.wrench)
+    assert np.linalg.norm(borne[:3]) > 0.1  # [N]
+    path, copies = tmp_path / "towel.npz", world.imagine(2)
+    saved = world.save(path)
+    for own in grips_by_key(copies).values():
+        np.testing.assert_array_equal(np.concatenate(own.wrench, axis=-1), [borne, borne])
+    world.run(0.1)
+    assert not np.array_equal(np.concatenate(grip.wrench), borne)
+    for kept in (saved, path):
+        world.restore(kept)
+        np.testing.assert_array_equal(np.concatenate(grip.wrench), borne)
+    with np.load(path) as file:
+        arrays = dict(file)
+    header = json.loads(str(arrays["header"])) | {"format": 5}
+    for own in header["world"]["fields"]["grips"]:
+        del own["fields"]["borne"]
+    arrays["header"] = np.array(json.dumps(header))
+    np.savez(tmp_path / "older.npz", **arrays)
+    world.restore(tmp_path / "older.npz")
+    np.testing.assert_array_equal(np.concatenate(grip.wrench), 0.0)
+
+
 def test_files_that_cannot_be_read(tmp_path):
     """No file, damaged files, other formats and pickles raise FileFormatError, and nothing changes."""
     world, _, _ = room()
@@ -133,13 +163,13 @@ def test_files_that_cannot_be_read(tmp_path):
     with np.load(path) as file:
         arrays = dict(file)
     header = json.loads(str(arrays["header"]))
-    assert header["format"] == 5 and header["units"]["length"] == "m" and len(header["meshes"]) == 5
+    assert header["format"] == 6 and header["units"]["length"] == "m" and len(header["meshes"]) == 5
 
     def variant(name, **changes):
         changed = {**arrays, "header": np.array(json.dumps({**header, **changes}))}
         np.savez(tmp_path / name, **changed)
 
-    variant("newer.npz", format=6)
+    variant("newer.npz", format=7)
     variant("strange.npz", world={"type": "Path", "fields": {}})
     fields = header["world"]["fields"]
     variant("engine.npz", world={"type": "Snapshot", "fields": {**fields, "engine": "odd"}})

@@ -183,7 +183,7 @@ class ParticleDynamics(Dynamics):
             frame_rate=world.frame_rate, substeps=world.substeps, friction=friction,
         )  # fmt: skip
         hold_memory(self.solver, world.device, self.solver.memory_bytes)
-        self._pushing: tuple[Push, ...] = ()
+        self.acting: tuple[Push, ...] = ()
 
     @property
     def substeps(self) -> int:  # type: ignore[override]
@@ -274,9 +274,9 @@ class ParticleDynamics(Dynamics):
             self.solver.set_grips([grip.spec_for(time, frame) for grip in grips])
             self.grips_changed, self.grips_before = False, None
         pushing = self.pushing(time)
-        if pushing != self._pushing:
+        if pushing != self.acting:
             self.solver.set_forces(np.sum([p.force for p in pushing], axis=0) if pushing else None)
-            self._pushing = pushing
+            self.acting = pushing
 
     def shape_impulses(self) -> dict[str, np.ndarray]:
         """Return what static bodies gave this one in the last frame, (worlds, 3) [N s], by key, where it is summed."""

@@ -70,12 +70,22 @@ def _coupled(world: BuiltinWorld) -> list[Any]:
     return list(world._stepping.last)
 
 
+def _prepare(world: BuiltinWorld, dynamics: ParticleDynamics) -> None:
+    """Bring what acts on a body where it has changed, and leave the ways on which grips are led as they are."""
+    if not dynamics.grips_changed and dynamics.pushing(world.time) == dynamics.acting:
+        return
+    ways = [(grip, grip.spec) for grip in dynamics.grips]
+    dynamics.prepare(world.time, 1.0 / world.frame_rate)
+    for grip, spec in ways:
+        grip.spec = spec
+
+
 def _on_itself(world: BuiltinWorld, body: Body, dynamics: ParticleDynamics) -> list[tuple[Any, ...]]:
     """Return what a cloth's contacts with itself would do to its particles in the next substep."""
     from nuno.solvers.self_forces import self_contact_forces
 
     dynamics.set_self_contact(rules_of(world).touches_itself(body))
-    dynamics.prepare(world.time, 1.0 / world.frame_rate)
+    _prepare(world, dynamics)
     points = dynamics.vertices(body)
     normals, forces = self_contact_forces(dynamics.solver, world.time)
     touching = np.argwhere(np.linalg.norm(normals, axis=-1) > 0.0)
@@ -93,7 +103,7 @@ def _on_shapes(world: BuiltinWorld, body: Body, dynamics: ParticleDynamics) -> l
     static = [other for other in world.bodies if dynamics_of(other) is None]
     touching, _ = rules_of(world).colliders_of(body, static)
     found: list[tuple[Any, ...]] = []
-    dynamics.prepare(world.time, 1.0 / world.frame_rate)
+    _prepare(world, dynamics)
     points = dynamics.vertices(body)
     pressed = np.zeros(points.shape[:2], dtype=bool)
     for coupled in _coupled(world):

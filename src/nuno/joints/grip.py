@@ -79,6 +79,8 @@ class Grip:
         # of a rigid body with a static leader: when a frame began [s], and where it was led from and to in that frame;
         # not a number in worlds of a batch where it was not led yet
         self.followed: tuple[float, Pose, Pose] | None = None
+        # when it was restored [s], and what it bore in the frame before, (worlds, 6) [N, N m]
+        self.borne: tuple[float, np.ndarray] | None = None
         self._world: GripWorld | None = None
         self.unmet_frames = 0  # in so many frames one after the other it was not met; -1: that was told
 
@@ -122,7 +124,7 @@ class Grip:
 
         (3,) each, in a batch (worlds, 3); the torque is about the mean of the held points, or the origin of the held
         rigid body. A held towel at rest gives its weight, downwards. Of a weld, what ``body`` does to the other. The
-        mean over the last frame; zero before the first, also after ``restore`` and ``adopt``.
+        mean over the last frame, also of one before ``save``, ``imagine`` or ``adopt``; zero before the first.
 
         Raises:
             BodyStateError: the grip was released.

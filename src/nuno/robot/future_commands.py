@@ -33,8 +33,8 @@ class CommandedRobot(Protocol):
     def follow_grips(self, waiting: Sequence[GripOrder], given: Sequence[GripOrder], later: float) -> bool:
         """Let its hands do from now on what those of a copy were told; return whether that is anything."""
 
-    def saved(self) -> tuple[Any, Any, Any, Any]:
-        """Return its state, what is wanted of it, its servo command, and what was found of its way."""
+    def saved(self) -> tuple[Any, Any, Any, Any, Any]:
+        """Return its state, what is wanted, its servo command, what was found of its way, and what it feels."""
 
     def servo(self, command: ServoCommand | None) -> None:
         """Put joints under a torque law, or give them back."""

@@ -13,6 +13,7 @@ import numpy as np
 from nuno.errors import NunoError, WalkError
 from nuno.robot.footsteps import middle_of, steps_of_velocity
 from nuno.robot.goal import Goal, GoalStatus, ResultCode
+from nuno.robot.gravity import EARTH
 from nuno.robot.preview_control import TICK
 from nuno.robot.robot_model import standing_place
 from nuno.robot.robot_state import RobotState
@@ -70,6 +71,7 @@ class Gait:
     Attributes:
         looks: Asked before a velocity is taken, where not None.
         bears: Asked before a walk to a place is planned, where not None.
+        gravity: Returns the gravity (3,) [m/s2] that walks are planned for.
         plans: Walks that were planned for the robot and its copies.
     """
 
@@ -87,6 +89,7 @@ class Gait:
         self._later: tuple[WalkOrder, ...] = ()  # what comes after that, each as if it were told then
         self.looks: Looks | None = None
         self.bears: Load | None = None
+        self.gravity: Callable[[], Sequence[float]] = lambda: EARTH
         self.plans = WalkPlans()
 
     @property
@@ -163,7 +166,8 @@ class Gait:
 
     def planned(self, x: float, y: float, yaw: float, seconds: float | None) -> Walk | str:
         """Return the walk on which ``go`` sets off from standing, or why there is none; nothing changes."""
-        return self.plans.plan(self._robot, x, y, yaw, seconds, None if self.bears is None else self.bears())
+        load = self.bears() if self.bears else None
+        return self.plans.plan(self._robot, x, y, yaw, seconds, load, self.gravity())
 
     def begin(self, walk: Walk | RunningWalk | str, goal: Goal) -> None:
         """Set off on a walk that was planned, or reject the goal where there is none."""
@@ -252,7 +256,7 @@ class Gait:
         return goal
 
     def _set_off(self, goal: Goal, velocity: np.ndarray, until: float) -> None:
-        walk = self.plans.set_off(self._robot, velocity)
+        walk = self.plans.set_off(self._robot, velocity, self.gravity())
         if self.looks is not None and not isinstance(walk, str) and (met := self.looks(walk, 0.0)) is not None:
             walk = str(met)
         self.begin(walk, goal)
@@ -341,10 +345,9 @@ class Gait:
             return
         (goal, place), self._waiting = self._waiting, None
         x, y, yaw = standing_place(self._robot)
-        forward, left = place[0] - x, place[1] - y
-        c, s = math.cos(yaw), math.sin(yaw)
+        forward, left, c, s = place[0] - x, place[1] - y, math.cos(yaw), math.sin(yaw)
         ahead = (c * forward + s * left, c * left - s * forward, place[2] - yaw)
-        self.begin(self.plans.plan(self._robot, *ahead, None), goal)
+        self.begin(self.plans.plan(self._robot, *ahead, None, gravity=self.gravity()), goal)
 
     def save(self) -> tuple[Any, ...]:
         """Return all that it is, for ``load``."""

@@ -68,8 +68,8 @@ class OriginalRobot(Protocol):
     def grip_orders(self) -> tuple[GripOrder, ...]:
         """Return what its hands are to do later."""
 
-    def saved(self) -> tuple[RobotState, Any, Any, Any]:
-        """Return its state, what is wanted of it, its servo command, and what was found of its way."""
+    def saved(self) -> tuple[RobotState, Any, Any, Any, Any]:
+        """Return its state, what is wanted, its servo command, what was found of its way, and what it feels."""
 
     def angle_vector_duration(self, start_av: Angles, end_av: Angles) -> Any:
         """Return the shortest time [s] from one posture to another."""
@@ -100,7 +100,7 @@ class ImaginedRobot(ImaginedBase, ImaginedHands):
     ) -> None:  # fmt: skip
         self.original, self.world = original, world
         self.joint_names = original.actual.joint_names
-        state, motion, self._servo, found = original.saved() if of is None else of[0].saved_of(of[1])
+        state, motion, self._servo, found, felt = original.saved() if of is None else of[0].saved_of(of[1])
         # what is under way as the robot itself is imagined, and what each copy was sent since
         self._under_way: Any = motion if of is None else of[0]._under_way
         self._sent: list[tuple[Any, ...]] = [() if of is None else of[0]._sent[of[1]]] * world.world_count
@@ -117,6 +117,7 @@ class ImaginedRobot(ImaginedBase, ImaginedHands):
             own.load(motion)
             goals.append(own.disown())
             own.gait.plans, own.gait.bears = original.gait.plans, partial(self._carried, k)
+            own.gait.gravity = lambda: self.world.gravity
             for name, controller in own.joints.controllers.items():
                 controller.near = original.joints.controllers[name].near
             self._motions.append(own)
@@ -128,8 +129,10 @@ class ImaginedRobot(ImaginedBase, ImaginedHands):
             self._guards[k].load(found)
             own.gait.looks = self._guards[k].velocities_of(own)
         self._sensors: ImaginedSensors | None = None  # made when they are first read
-        self._loads: ImaginedLoads | None = None  # made when a servo command first asks for them
         self._make_hands(of, goals)
+        self._loads: ImaginedLoads | None = None
+        if self._servo is not None and whole:
+            self._loads = ImaginedLoads(original.links, world, self._links, [felt] * world.world_count)
         closing = [name for name, own in original.grippers.items() if own.will_hold and name not in self.hands]
         if closing and of is None:
             logger.warning(
@@ -273,13 +276,14 @@ class ImaginedRobot(ImaginedBase, ImaginedHands):
         robot = self.original.actual
         return np.clip([robot.angles_of(state.q) for state in self._states], *robot.joint_limits)
 
-    def saved_of(self, world: int) -> tuple[RobotState, Any, Any, Any]:
+    def saved_of(self, world: int) -> tuple[RobotState, Any, Any, Any, Any]:
         """Return of one world what ``SimulatedRobot.saved`` does of the robot."""
         if not 0 <= world < len(self._motions):
             raise InvalidInputError(f"world must be in 0 to {len(self._motions) - 1}, got {world}")
         self._together.bring()
         found = self._guards[world].save() if self._guards else None
-        return self._states[world], self._motions[world].save(), self._servo, found
+        felt = None if self._loads is None else self._loads.save()[world]
+        return self._states[world], self._motions[world].save(), self._servo, found, felt
 
     def commanded_in(self, world: int) -> tuple[Any, Any, tuple[Sent | WalkOrder, ...]]:
         """Return what was under way as the robot was imagined, its servo command, and what a copy was sent since."""
@@ -324,6 +328,8 @@ class ImaginedRobot(ImaginedBase, ImaginedHands):
         if not self._is_whole():
             return
         if self.balance is None:
+            if self._loads is not None:
+                self._loads.take()
             self._together.end()
             self._end_hands(self._angles)
             self._states = [
@@ -347,11 +353,12 @@ class ImaginedRobot(ImaginedBase, ImaginedHands):
         found = [guard.save() for guard in self._guards]
         self._together.bring()
         motions, given = [own.save() for own in self._motions], (list(self._sent), list(self._base_goals))
-        return list(self._states), motions, joints, self._servo, found, given, self._save_hands()
+        felt = None if self._loads is None else self._loads.save()
+        return list(self._states), motions, joints, self._servo, found, given, self._save_hands(), felt
 
     def load(self, saved: Any) -> None:
         """Become what it was when a snapshot was taken."""
-        states, motions, joints, self._servo, found, (sent, refused), hands = saved
+        states, motions, joints, self._servo, found, (sent, refused), hands, felt = saved
         self._states, self._read, self._sent, self._base_goals = list(states), None, list(sent), list(refused)
         self._together.forget()
         for own, motion in zip(self._motions, motions, strict=True):
@@ -361,6 +368,8 @@ class ImaginedRobot(ImaginedBase, ImaginedHands):
         if self.balance is not None:
             self.balance.dynamics.load(joints)
         self._load_hands(hands)
+        if self._loads is not None:
+            self._loads.load(felt)
 
     def imagined(self, futures: World, world: int) -> ImaginedRobot | None:
         """Return the copies of one world's robot in a batch that was imagined from that world; None without links."""
@@ -373,8 +382,7 @@ class ImaginedRobot(ImaginedBase, ImaginedHands):
         return all(body._world is self.world for body in self._links)
 
     def _serve(self, world: int, before: RobotState, others: Any, base: Any, span: float) -> tuple[np.ndarray, Any]:
-        if self._loads is None:
-            self._loads = ImaginedLoads(self.original.links, self.world, self._links)
+        assert self._loads is not None
         if world == 0:
             self._loads.renew()
         self._servo.take_gravity(self.world.gravity)

@@ -42,6 +42,23 @@ class Load:
 
 
 @dataclass(frozen=True, eq=False)
+class BodyLoads:
+    """The loads of one body on links in a frame.
+
+    Attributes:
+        body: Its key.
+        grips: Keys of the grips that held it.
+        loads: All of them; what grips and contacts do may be in one.
+        contacts: Those of its contacts, as far as they are known by themselves.
+    """
+
+    body: str
+    grips: tuple[str, ...]
+    loads: tuple[Load, ...]
+    contacts: tuple[Load, ...]
+
+
+@dataclass(frozen=True, eq=False)
 class _Motion:
     """The motion of a body at a time [s].
 
@@ -86,6 +103,7 @@ class LinkLoads:
         self._joints = links.joints
         self._read_at: tuple[float, tuple[str, ...]] | None = None
         self._version: int | None = None
+        self._of_bodies: dict[Body, tuple[Load, ...]] = {}
         self._loads: tuple[Load, ...] = ()
         self._motions: dict[Body, _Motion] = {}
         self._noted: dict[Body, _Motion] = {}
@@ -101,7 +119,8 @@ class LinkLoads:
             moving = self._moving()
             now = (world.time, tuple(grip.key for own in moving.values() for grip in self._grips_of(own)))
             if now != self._read_at:
-                self._loads = tuple(load for body, dynamics in moving.items() for load in self._of(body, dynamics))
+                self._of_bodies = {body: tuple(self._of(body, dynamics)) for body, dynamics in moving.items()}
+                self._loads = tuple(load for own in self._of_bodies.values() for load in own)
                 self._reader.keep_only(list(moving))
                 of_bodies: tuple[dict[Body, Any], ...] = (self._motions, self._contacts)
                 for kept in of_bodies:
@@ -109,6 +128,45 @@ class LinkLoads:
                         del kept[body]
                 self._read_at = now
         return self._loads
+
+    def of_frame(self) -> list[BodyLoads]:
+        """Return the loads of the frame that began with ``note`` by the body that does it.
+
+        So they depend on nothing from before that frame.
+        """
+        with self._world.lock:
+            noted = self._noted
+            self.forget()
+            self._follow()
+            self._noted = noted
+            self.read()
+            return [
+                BodyLoads(body.key, self._grip_keys(body), loads, tuple(self._contacts.get(body, ())))
+                for body, loads in self._of_bodies.items() if loads
+            ]  # fmt: skip
+
+    def of_now(self, before: BodyLoads) -> tuple[Load, ...]:
+        """Return the loads of a body in the last frame, less those of grips that have let go since."""
+        found = [(body, dynamics) for body, dynamics in self._moving().items() if body.key == before.body]
+        if not found:
+            return ()
+        body, dynamics = found[0]
+        held = self._grip_keys(body)
+        if all(key in held for key in before.grips):
+            return before.loads
+        particles = isinstance(dynamics, ParticleDynamics)
+        x = self._reader.rows(body, dynamics.solver, self._k)[:3] if particles else self._reader.places(body, self._k)
+        kept = [grip for grip in self._grips_of(dynamics) if grip.key in before.grips and grip.target in self._index]
+        return (*(self._of_grip(grip, x) for grip in kept), *before.contacts)
+
+    def _of_grip(self, grip: Grip, x: np.ndarray) -> Load:
+        """Return what a grip bears of a body whose vertices are at x (3, n) [m]."""
+        force, torque = self._reader.wrench(grip, self._k)
+        assert grip.target is not None
+        return Load(self._index[grip.target], held_points(grip, self._k, x.T).mean(axis=0), force, torque)
+
+    def _grip_keys(self, body: Body) -> tuple[str, ...]:
+        return tuple(grip.key for grip in self._grips_of(dynamics_of(body)))
 
     def note(self) -> None:
         """Take note of how bodies move now, for a reading in the next frame; what bears on links is not worked out."""
@@ -128,12 +186,11 @@ class LinkLoads:
         version = self._world._collider_version
         if version != self._version:
             self._version, self._read_at = version, None
-            for kept in (self._motions, self._noted, self._contacts):
-                kept.clear()
+            self._motions, self._noted, self._contacts = {}, {}, {}
 
     def _moving(self) -> dict[Body, Any]:
         """Return all bodies with dynamics but the links, and their dynamics."""
-        bodies = [body for body in self._world._bodies.values() if body.is_dynamic and body not in self._index]
+        bodies = [body for body in self._world.bodies if body.is_dynamic and body not in self._index]
         return {body: dynamics_of(body) for body in bodies}
 
     def _grips_of(self, dynamics: Any) -> list[Grip]:

@@ -30,6 +30,7 @@ class PreviewControl:
         height: Above the floor [m].
         tick: Time between two samples [s].
         horizon: How far it looks ahead [s].
+        gravity: [m/s2].
 
     Attributes:
         transition: (3, 3) float, of position, velocity and acceleration over a tick.
@@ -41,13 +42,15 @@ class PreviewControl:
             constant: the last gain holds the sum of all that would follow, so that nothing depends on the origin.
     """
 
-    def __init__(self, height: float, tick: float = TICK, horizon: float = HORIZON) -> None:
+    def __init__(
+        self, height: float, tick: float = TICK, horizon: float = HORIZON, gravity: float = GRAVITY
+    ) -> None:  # fmt: skip
         h, t = number("height", height, above=0.0), number("tick", tick, above=0.0)
         n = max(1, round(number("horizon", horizon, above=0.0) / t))
-        self.height, self.tick = h, t
+        self.height, self.tick, self.gravity = h, t, number("gravity", gravity, above=0.0)
         self.transition = np.array([[1.0, t, 0.5 * t * t], [0.0, 1.0, t], [0.0, 0.0, 1.0]])
         self.entry = np.array([t**3 / 6.0, 0.5 * t * t, t])
-        self.output = np.array([1.0, 0.0, -h / GRAVITY])
+        self.output = np.array([1.0, 0.0, -h / self.gravity])
         self.augmented = np.zeros((4, 4))
         self.augmented[0, 0] = 1.0
         self.augmented[0, 1:], self.augmented[1:, 1:] = self.output @ self.transition, self.transition
@@ -79,7 +82,7 @@ class PreviewControl:
             reference: (n, 2) float [m], of the zero moment point at each tick; it stays where it ends.
             state: (3, 2) float, position [m], velocity and acceleration at the first tick.
         """
-        w = np.sqrt(GRAVITY / self.height)
+        w = np.sqrt(self.gravity / self.height)
         fading = np.exp(-w * self.tick * np.arange(len(reference)))
         parts = fading[:-1] - fading[1:]
         between = 0.5 * (reference[:-1] + reference[1:])

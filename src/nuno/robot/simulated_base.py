@@ -37,8 +37,8 @@ class SimulatedBase(SimulatedBody):
             if self.gait.is_walking:
                 self.gait.change(goal, x, y, yaw, seconds)
                 return goal
-            standing, load = self.wanted.copy(), self._carried()
-        walk = self.gait.plans.plan(standing, x, y, yaw, seconds, load)  # the world goes on meanwhile
+            standing, load, gravity = self.wanted.copy(), self._carried(), self.world.gravity
+        walk = self.gait.plans.plan(standing, x, y, yaw, seconds, load, gravity)  # the world goes on meanwhile
         with self.world.lock:
             if self.gait.is_walking:
                 goal.finish(GoalStatus.REJECTED, text="another walk was begun meanwhile")

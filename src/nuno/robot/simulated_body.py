@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from nuno.joints.grip import Grip
     from nuno.robot.balance import Balance
     from nuno.robot.burden import Burden
+    from nuno.robot.felt_loads import FeltLoads
     from nuno.robot.gait import Gait
     from nuno.robot.hands import Hand
     from nuno.robot.humanoid import Humanoid
@@ -62,6 +63,7 @@ class SimulatedBody(SimulatedSenses):
     _motion: WantedMotion
     guard: MotionGuard
     _burden: Burden
+    _felt: FeltLoads
     _entered: bool
     _servo: Servo | None
     _is_torn = False  # and that was told
@@ -264,5 +266,6 @@ class SimulatedBody(SimulatedSenses):
             self.actual.move_to(self.wanted.angle_vector(), q[:7])
 
     def _look_anew(self) -> None:
+        self._felt.forget()
         self.guard.forget()
         self._burden.forget()

@@ -11,12 +11,12 @@ import numpy as np
 from nuno.errors import BodyStateError, InvalidInputError, UnknownNameError
 from nuno.robot.balance import Balance
 from nuno.robot.burden import Burden
+from nuno.robot.felt_loads import FeltLoads
 from nuno.robot.goal import Goal, GoalStatus, ResultCode, Tolerances
 from nuno.robot.grip_order import GripOrder, GripQueue
 from nuno.robot.hands import hands_of
 from nuno.robot.humanoid import Humanoid
 from nuno.robot.joint_interface import Controller
-from nuno.robot.loads import LinkLoads
 from nuno.robot.motion_guard import MotionGuard
 from nuno.robot.overlapping_robots import warn_of_overlaps
 from nuno.robot.readings import JointState
@@ -109,8 +109,9 @@ class SimulatedRobot(SimulatedBase):
         self.sensors = Sensors(self.actual, self.links, models=sensors, seed=seed)
         self._readings: tuple[float, Readings] | None = None
         self._cameras = SimulatedCameras(self.links, cameras)
-        self.loads = LinkLoads(self.links)
+        self._felt = FeltLoads(self.links)
         self.guard, self._burden = MotionGuard(self.links, collisions), Burden(self.actual, self.links)
+        self.gait.gravity = lambda: self.world.gravity
         self.gait.looks, self.gait.bears = self.guard.velocities_of(self._motion), self._carried
         self._servo: Servo | None = None
         self._before: RobotState | None = None  # its state when the frame began
@@ -218,6 +219,8 @@ class SimulatedRobot(SimulatedBase):
         with self.world.lock:
             wanted = None if command is None else Servo(self.actual, command, self.world.gravity)
             before = self._servo
+            if wanted is not None and not self.is_dynamic:
+                self._felt.begin()
             if before is None or wanted is None or not np.array_equal(before.rows, wanted.rows):
                 moved = [own.rows for own in (before, wanted) if own is not None]
                 for name, rows in self.joints.rows.items():
@@ -230,7 +233,7 @@ class SimulatedRobot(SimulatedBase):
 
     def _external(self) -> Any:
         """Return what bodies do to the links, None where there is nothing."""
-        loads = self.loads.read() if any(own.is_dynamic for own in self.world.bodies) else ()
+        loads = self._felt.read()
         return external_forces(self.links, loads, self.links.robot.update().oMi) if loads else None
 
     def _controller_name(self, controller: Controller) -> str:
@@ -294,6 +297,8 @@ class SimulatedRobot(SimulatedBase):
             self.actual.move_to(angles, self._state.q[:7])
             actual = (angles, self._state.v[6:], self._state.a[6:])
         else:
+            if self._servo is not None:
+                self._felt.take()
             self._state = self._burden.after_frame(self._state, self.guard.met)
         self.joints.take_step(actual)
         for gripper in self.grippers.values():
@@ -310,14 +315,15 @@ class SimulatedRobot(SimulatedBase):
         """Return all that it is, for a snapshot."""
         joints = () if self.balance is None else self.balance.dynamics.save()
         hands, guard = self._save_hands(), self.guard.save()
-        return self._state, self._motion.save(), joints, hands, self._servo, guard, self._burden.save()
+        felt = self._felt.save()
+        return self._state, self._motion.save(), joints, hands, self._servo, guard, self._burden.save(), felt
 
     def _save_hands(self) -> Any:
         return {name: gripper.save() for name, gripper in self.grippers.items()}, self._grip_queue.waiting
 
     def load(self, saved: Any) -> None:
         """Become what it was when a snapshot was taken; goals that came since are given up."""
-        self._state, motion, joints, (grippers, self._grip_queue.waiting), self._servo, guard, burden = saved
+        self._state, motion, joints, (grippers, self._grip_queue.waiting), self._servo, guard, burden, felt = saved
         self._motion.load(motion)
         if self.balance is not None:
             self.balance.dynamics.load(joints)
@@ -329,6 +335,7 @@ class SimulatedRobot(SimulatedBase):
         self._readings = None
         self.guard.load(guard)
         self._burden.load(burden)
+        self._felt.load(felt)
 
     def grip_orders(self) -> tuple[GripOrder, ...]:
         """Return what its hands are to do later, for its copies."""
@@ -339,9 +346,9 @@ class SimulatedRobot(SimulatedBase):
         self._grip_queue.follow(waiting, given, later)
         return bool(self._grip_queue.waiting)
 
-    def saved(self) -> tuple[RobotState, Any, Any, Any]:
-        """Return its state, what is wanted of it, its servo command, and what was found of its way, for its copies."""
-        return self._state, self._motion.save(), self._servo, self.guard.save()
+    def saved(self) -> tuple[RobotState, Any, Any, Any, Any]:
+        """Return its state, what is wanted, its servo command, what was found of its way, and what it feels."""
+        return self._state, self._motion.save(), self._servo, self.guard.save(), self._felt.save()
 
     def imagined(self, futures: World, world: int) -> ImaginedRobot:
         """Return the driver of this robot's copies in a batch that was imagined from its world."""
@@ -357,8 +364,8 @@ class SimulatedRobot(SimulatedBase):
                     copies = other.balance  # type: ignore[attr-defined]
                     self.balance.dynamics.take(None if copies is None else copies.dynamics)
                 joints = () if self.balance is None else self.balance.dynamics.save()
-                state, motion, servo, guard = other.saved_of(k)  # type: ignore[attr-defined]
-                self.load((state, motion, joints, self._save_hands(), servo, guard, self._burden.save()))
+                state, motion, servo, guard, felt = other.saved_of(k)  # type: ignore[attr-defined]
+                self.load((state, motion, joints, self._save_hands(), servo, guard, self._burden.save(), felt))
                 goals = self._motion.disown()
                 self._base_goal = self.gait.goal
                 drop_empty_grips(self.world, self.links.bodies)

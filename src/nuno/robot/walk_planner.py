@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -13,9 +13,10 @@ from numpy.typing import ArrayLike
 
 from nuno.errors import InvalidInputError, WalkError
 from nuno.robot.footsteps import SOLE_GAP, Footstep, sole_gap
+from nuno.robot.gravity import EARTH, take_gravity, walking_gravity
 from nuno.robot.leg_motion import LegMotion, Targets
 from nuno.robot.pinocchio import pin
-from nuno.robot.preview_control import TICK, PreviewControl
+from nuno.robot.preview_control import GRAVITY, HORIZON, TICK, PreviewControl
 from nuno.robot.stride import Stride, two_feet
 from nuno.robot.timeline import Schedule, Timeline, smooth, timeline
 from nuno.robot.trajectory import JointTrajectory, Spline
@@ -62,13 +63,14 @@ class WalkPlanner:
 
     def __init__(
         self, robot: Humanoid, stride: Stride | None, arms: Arms, load: tuple[float, ArrayLike] | None, margin: float,
-        look_for_collisions: bool,
+        look_for_collisions: bool, gravity: Sequence[float] = EARTH,
     ) -> None:  # fmt: skip
+        pull = walking_gravity(finite_array("gravity", gravity, (3,)).tolist())
         self.robot = robot.copy()
         self.working = threading.RLock()  # it has one place to work in, and copies in other threads share its walks
         self.stride = Stride.of(robot) if stride is None else stride
         self.margin, self.look_for_collisions = number("margin", margin), look_for_collisions
-        self.model = _loaded(robot.model, load)
+        self.model = _under(gravity, _loaded(robot.model, load))
         self.legs = LegMotion(robot, self.model)
         self.soles = [np.asarray(robot.description.frames[foot].size) for foot in two_feet(robot)]
         self._take_arms(arms)
@@ -89,7 +91,8 @@ class WalkPlanner:
         self._base = turn @ pin.Quaternion(self.start[3:7]).toRotationMatrix()  # as it is, seen from the feet
         self.centre = np.array(pin.centerOfMass(model, data, self.start))
         self._stand_nominally(data)
-        self.control = PreviewControl(self.height)
+        # a slower pendulum must know more of what comes
+        self.control = PreviewControl(self.height, TICK, HORIZON * float(np.sqrt(GRAVITY / pull)), pull)
         self.lead = max(1, round(self.stride.shift / TICK))
 
     def __getstate__(self) -> dict[str, Any]:
@@ -316,4 +319,13 @@ def _loaded(model: Any, load: tuple[float, ArrayLike] | None) -> Any:
     made = model.copy()
     inertia = pin.Inertia(number("the mass of the load", mass, low=0.0), np.zeros(3), np.zeros((3, 3)))
     made.appendBodyToJoint(1, inertia, pin.SE3(np.eye(3), finite_array("the place of the load", place, (3,))))
+    return made
+
+
+def _under(gravity: Sequence[float], model: Any) -> Any:
+    """Return a model that reckons with a gravity (3,) [m/s2]; the one that is given stays as it is."""
+    if model.gravity.linear.tolist() == [*gravity]:
+        return model
+    made = model.copy()
+    take_gravity(made, gravity)
     return made

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary, WeakValueDictionary
 
 import numpy as np
 
 from nuno.errors import NunoError
+from nuno.robot.gravity import EARTH
 from nuno.robot.running_walk import RunningWalk, run_on, set_off
 from nuno.robot.walk import TimedMotion, Walk
 from nuno.robot.walk_planner import MARGIN, WalkPlanner
@@ -37,7 +39,7 @@ class WalkPlans:
 
     def plan(
         self, robot: Humanoid, x: float, y: float, yaw: float, seconds: float | None,
-        load: tuple[float, np.ndarray] | None = None,
+        load: tuple[float, np.ndarray] | None = None, gravity: Sequence[float] = EARTH,
     ) -> Walk | str:  # fmt: skip
         """Return a walk from where a robot stands, or why there is none; nothing changes.
 
@@ -48,18 +50,20 @@ class WalkPlans:
             yaw: Counterclockwise [rad].
             seconds: In which it covers that [s]; None as it walks by itself.
             load: What it carries, as ``plan_walk`` takes it.
+            gravity: (3,) [m/s2].
         """
         bears = None if load is None else (load[0], load[1].tobytes())
         stands = robot.configuration().tobytes(), robot.angle_vector().tobytes()
-        key = (*stands, x, y, yaw, seconds, bears)
+        key = (*stands, x, y, yaw, seconds, bears, *gravity)
         found = self._walks.get(key) or self._refused.get(key)
         if found is not None:
             return found
         try:
             if seconds is None:
-                walk = plan_walk(robot, x, y, yaw, load=load)
+                walk = plan_walk(robot, x, y, yaw, load=load, gravity=gravity)
             else:
-                walk = plan_walk_velocity(robot, x / seconds, y / seconds, yaw / seconds, seconds, load=load)
+                velocity = x / seconds, y / seconds, yaw / seconds
+                walk = plan_walk_velocity(robot, *velocity, seconds, load=load, gravity=gravity)
         except NunoError as error:
             if len(self._refused) >= REFUSALS:
                 self._refused.clear()
@@ -91,14 +95,16 @@ class WalkPlans:
                 found = known[key] = continue_walk(walk, time, x / seconds, y / seconds, yaw / seconds, seconds)
             return found  # type: ignore[no-any-return]
 
-    def set_off(self, robot: Humanoid, velocity: np.ndarray) -> RunningWalk | str:
+    def set_off(
+        self, robot: Humanoid, velocity: np.ndarray, gravity: Sequence[float] = EARTH
+    ) -> RunningWalk | str:  # fmt: skip
         """Return the walk at a velocity (3,) [m/s, m/s, rad/s] from where a robot stands, or why there is none."""
-        key = (robot.configuration().tobytes(), robot.angle_vector().tobytes(), velocity.tobytes())
+        key = (robot.configuration().tobytes(), robot.angle_vector().tobytes(), velocity.tobytes(), *gravity)
         with self._changing:
             found = self._running.get(key)
             if found is None:
                 try:
-                    found = set_off(WalkPlanner(robot, None, None, None, MARGIN, True), velocity)
+                    found = set_off(WalkPlanner(robot, None, None, None, MARGIN, True, gravity), velocity)
                 except NunoError as error:
                     return str(error)
                 self._running[key] = found

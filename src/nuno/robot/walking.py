@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from nuno.errors import InvalidInputError, WalkError
 from nuno.robot.footsteps import Footstep, footsteps_along, footsteps_to, middle_of, moved, steps_of_velocity
+from nuno.robot.gravity import EARTH
 from nuno.robot.preview_control import TICK
 from nuno.robot.stride import Stride
 from nuno.robot.walk import Walk
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 def plan_walk(
     robot: Humanoid, x: float = 0.0, y: float = 0.0, yaw: float = 0.0, *, stride: Stride | None = None,
     arms: Arms = None, load: tuple[float, ArrayLike] | None = None, margin: float = MARGIN,
-    check_collisions: bool = True,
+    check_collisions: bool = True, gravity: Sequence[float] = EARTH,
 ) -> Walk:  # fmt: skip
     """Plan a walk to a place seen from where the robot stands; the robot itself stays as it is.
 
@@ -45,6 +46,7 @@ def plan_walk(
         load: What it carries beside its own links: mass [kg], and where (3,) in the frame of the base link [m].
         margin: By which the zero moment point must stay inside the soles that stand [m].
         check_collisions: Whether links must not run into each other (looked at every 0.1 s).
+        gravity: (3,) [m/s2], along -z.
 
     Raises:
         WalkError: it cannot walk so; the message says why, and what helps.
@@ -52,7 +54,7 @@ def plan_walk(
         InvalidInputError: not finite, arms beyond their limits, or joints of the legs among them.
         UnknownNameError: no joint of a name among ``arms``.
     """
-    planner = WalkPlanner(robot, stride, arms, load, margin, check_collisions)
+    planner = WalkPlanner(robot, stride, arms, load, margin, check_collisions, gravity)
     ahead = np.array([number(name, value) for name, value in (("x", x), ("y", y), ("yaw", yaw))])
     feet = planner.feet[:, [0, 1, 3]]
     return planner.first(footsteps_to(moved(middle_of(feet), ahead), feet, planner.stride, planner.soles))
@@ -62,7 +64,7 @@ def plan_walk(
 def plan_walk_velocity(
     robot: Humanoid, vx: float = 0.0, vy: float = 0.0, vyaw: float = 0.0, seconds: float = 1.0, *,
     stride: Stride | None = None, arms: Arms = None, load: tuple[float, ArrayLike] | None = None,
-    margin: float = MARGIN, check_collisions: bool = True,
+    margin: float = MARGIN, check_collisions: bool = True, gravity: Sequence[float] = EARTH,
 ) -> Walk:  # fmt: skip
     """Plan a walk at a velocity, which is kept for some seconds, from standing to standing.
 
@@ -79,12 +81,13 @@ def plan_walk_velocity(
         load: What the robot carries.
         margin: Of the zero moment point [m].
         check_collisions: Whether links must not run into each other.
+        gravity: (3,) [m/s2], along -z.
 
     Raises:
         InvalidInputError: it is faster than the stride allows; else as ``plan_walk``.
         WalkError: as ``plan_walk``.
     """
-    planner = WalkPlanner(robot, stride, arms, load, margin, check_collisions)
+    planner = WalkPlanner(robot, stride, arms, load, margin, check_collisions, gravity)
     twist, count = _twist(vx, vy, vyaw, seconds, planner.stride)
     feet = planner.feet[:, [0, 1, 3]]
     steps = footsteps_along(twist, feet, planner.stride, count, None, planner.soles) if count else []
@@ -95,6 +98,7 @@ def plan_walk_velocity(
 def plan_walk_footsteps(
     robot: Humanoid, footsteps: Sequence[Footstep], *, stride: Stride | None = None, arms: Arms = None,
     load: tuple[float, ArrayLike] | None = None, margin: float = MARGIN, check_collisions: bool = True,
+    gravity: Sequence[float] = EARTH,
 ) -> Walk:  # fmt: skip
     """Plan a walk over given footsteps, in the world.
 
@@ -104,10 +108,11 @@ def plan_walk_footsteps(
         robot: Left as it was.
         footsteps: In the order in which they are taken.
         stride: Of which only the times and the lift count.
-        arms: As for ``plan_walk``, as are ``load``, ``margin`` and ``check_collisions``.
+        arms: As for ``plan_walk``, as is all that follows.
         load: Likewise.
         margin: Likewise [m].
         check_collisions: Likewise.
+        gravity: Likewise (3,) [m/s2].
 
     Raises:
         InvalidInputError: something else than footsteps; and as ``plan_walk``.
@@ -116,7 +121,7 @@ def plan_walk_footsteps(
     steps = tuple(footsteps)
     if any(not isinstance(step, Footstep) for step in steps):
         raise InvalidInputError(f"footsteps must be a sequence of Footstep, got {footsteps!r}")
-    return WalkPlanner(robot, stride, arms, load, margin, check_collisions).first(steps)
+    return WalkPlanner(robot, stride, arms, load, margin, check_collisions, gravity).first(steps)
 
 
 @checked

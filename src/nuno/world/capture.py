@@ -38,7 +38,7 @@ def capture(world: Simulation, engine: str | None = None) -> Snapshot:
         time=world.time, gravity=world.gravity, frame_rate=world.frame_rate, substeps=world.substeps,
         world_count=world.world_count, family=world._family, engine=NEUTRAL if neutral else world.engine.name,
         bodies=tuple(_body_record(body, world, neutral) for body in world._bodies.values()),
-        grips=tuple(_grip_record(grip) for dynamics in world._attached() for grip in dynamics.grips),
+        grips=tuple(_grip_record(grip, world, neutral) for own in world._attached() for grip in own.grips),
         pair_friction=tuple(sorted(pairs, key=lambda pair: pair[:2])),
         ignored=tuple(ignored), rigid=None if neutral else layout_of(world), summed=tuple(sorted(rules.summed)),
         drivers=tuple((driver, driver.save()) for driver in world.drivers), clock_shift=world._clock_shift,
@@ -77,7 +77,8 @@ def apply(snapshot: Snapshot, world: Advancing) -> None:
         raise
     _take_apart(world, list(made.values()))
     world._time, world._clock_shift = snapshot.time, snapshot.clock_shift
-    world._stepping.last = []  # what contacts and ties gave in the last frame was in another past
+    # what contacts and ties gave in the last frame, and the ways of what led, were in another past
+    world._stepping.last, world._schedule = [], None
     for record in snapshot.bodies:
         _set_up(bodies[record.key], record)
         world._register(bodies[record.key])
@@ -152,9 +153,11 @@ def _body_record(body: Body, world: Simulation, neutral: bool = False) -> BodyRe
     )  # fmt: skip
 
 
-def _grip_record(grip: Grip) -> GripRecord:
-    target = None if grip.target is None else grip.target.key
-    return GripRecord(grip.key, grip.body.key, grip.spec, target, grip.offsets, grip.followed)
+def _grip_record(grip: Grip, world: Simulation, neutral: bool) -> GripRecord:
+    target, borne = None if grip.target is None else grip.target.key, None
+    if world.engine.is_builtin and not neutral and not isinstance(grip, Joint):
+        borne = np.atleast_2d(np.concatenate(grip.wrench, axis=-1))
+    return GripRecord(grip.key, grip.body.key, grip.spec, target, grip.offsets, grip.followed, borne)
 
 
 def _recorded_body(record: BodyRecord, snapshot: Snapshot, world: Simulation) -> Body:
@@ -249,6 +252,7 @@ def _restore_grip(record: GripRecord, bodies: dict[str, Body], world: Simulation
         grip.key = record.key
     grip.body, grip.target, grip.spec = bodies[record.body], target, spec
     grip.offsets, grip.followed = record.offsets, record.followed
+    grip.borne = None if record.borne is None else (world.time, record.borne)
     world._hold(grip)
 
 

@@ -102,11 +102,14 @@ def set_merged_grips(
         if not grip.is_tie and (spec is not grip.spec or offsets is not grip.offsets):
             moved_grips.setdefault(grip.body._dynamics, []).append(grip)
         grip.spec, grip.offsets, grip.followed = spec, offsets, followed
+        if grip.borne is not None:  # what it bore there was in another past
+            grip.borne = grip.borne[0], grip.borne[1].copy()
+            grip.borne[1][worlds] = 0.0
     for record, spec in back:
         grip = world._grips_by_key.get(record.key) or Grip(world._bodies[record.body], spec)
         grip.key, grip.body = record.key, world._bodies[record.body]
         grip.target = None if record.target is None else world._bodies[record.target]
-        grip.spec, grip.offsets, grip.followed = spec, record.offsets, record.followed
+        grip.spec, grip.offsets, grip.followed, grip.borne = spec, record.offsets, record.followed, None
         world._hold(grip)
     for dynamics in moved_grips:
         if not dynamics.grips_changed:

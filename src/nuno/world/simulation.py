@@ -329,6 +329,12 @@ class Simulation(Settings):
 
     def _wrench(self, grip: Grip) -> tuple[np.ndarray, np.ndarray]:
         """Return force [N] and torque [N m], (worlds, 3) each, that an active grip bears."""
+        if grip.borne is not None:
+            time, borne = grip.borne
+            if time == self._time:
+                own = np.where(holding(grip.spec, self.world_count)[:, None], borne, 0.0)
+                return own[:, :3], own[:, 3:]
+            grip.borne = None
         return self._engine.wrench(grip)
 
     def _kinematic_bodies(self) -> list[Body]:

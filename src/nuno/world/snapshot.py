@@ -128,6 +128,7 @@ class Snapshot:
                 offsets=tuple(map(batched, grip.offsets)) if isinstance(grip.offsets, tuple) else batched(grip.offsets),
                 spec=batched_spec(grip.spec, batched),
                 followed=_mapped_lead(grip.followed, batched),
+                borne=batched(grip.borne),
             )
             for grip in self.grips
         ]

@@ -32,8 +32,8 @@ from nuno.world.rigid_layout import RigidLayout, RigidPlace
 from nuno.world.snapshot import Snapshot
 from nuno.world.snapshot_records import BodyRecord, DynamicsRecord, GripRecord
 
-FORMAT = 5
-READABLE = (1, 2, 3, 4, FORMAT)  # 1 has no paths of bodies, 3 no clock of each world, 4 no engine
+FORMAT = 6
+READABLE = (1, 2, 3, 4, 5, FORMAT)  # 1 has no paths of bodies, 3 no clock of each world, 4 no engine, 5 no grips' loads
 ORIGIN = 3
 """The first format that says what the places of moving rigid bodies are relative to."""
 UNITS = {"length": "m", "mass": "kg", "time": "s", "force": "N", "quaternion": "wxyz", "up": "+z"}

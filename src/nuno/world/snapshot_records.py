@@ -70,3 +70,4 @@ class GripRecord:
     target: str | None
     offsets: Any  # of points an array, of a rigid body a place and a turn, or None
     followed: tuple[float, Pose, Pose] | None = None  # see ``Grip``
+    borne: np.ndarray | None = None  # (worlds, 6) [N, N m], what it bore in the last frame, where that is known
