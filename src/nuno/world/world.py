@@ -84,12 +84,12 @@ class World(Setting):
             if body._deformed is not None and len(body._deformed[0]) not in (1, self.world_count):
                 raise InvalidInputError(f"{body.name!r} has the shapes of {len(body._deformed[0])} worlds")
             taken = {other.name for other in self._bodies.values()}
-            name, number_ = body._name, 0
+            name, number_ = body.name, 0
             while name in taken:
                 number_ += 1
-                name = f"{body._name}_{number_}"
+                name = f"{body.name}_{number_}"
             if number_:
-                warn_of_double(body, self._own(body._name), name)
+                warn_of_double(body, self._own(body.name), name)
             body._name = name
             self._register(body)
             self._colliders_changed()
