@@ -10,11 +10,11 @@ HEIGHT = 0.2
 """[m], of the platform's top."""
 
 
-def stands(kind="g1"):
-    """A robot on a platform of 0.8 x 0.8 m, at rest."""
+def stands(kind="g1", size=0.8):
+    """A robot on a square platform of a size [m], at rest."""
     world = nuno.World(device="cpu")
     world.add(nuno.plane(name="floor"))
-    platform = world.add(nuno.box((0.8, 0.8, HEIGHT), name="platform", position=(0.0, 0.0, 0.5 * HEIGHT)))
+    platform = world.add(nuno.box((size, size, HEIGHT), name="platform", position=(0.0, 0.0, 0.5 * HEIGHT)))
     humanoid = nuno.Humanoid(kind)
     humanoid.stand((0.0, 0.0, HEIGHT))
     robot = nuno.SimulatedRobot(humanoid, world, dynamics=True)
@@ -43,14 +43,13 @@ def pressed(robot):
     return sum(force[2] for own in robot.state().contacts.values() for force in own.values())
 
 
-@pytest.mark.parametrize("kind", ["talos", "g1"])
-def test_a_standing_robot_goes_with_its_ground(kind):
+def test_a_standing_robot_goes_with_its_ground():
     """Up by 0.3 m in 1 s, and aside by 0.4 m in 2 s: it comes to rest where it stood there, within 2 mm.
 
     A quarter of the way up its feet bear m (g + a) within 2 %: the motion of least jerk has
     a = (60 s - 180 s^2 + 120 s^3) 0.3 m / (1 s)^2 there.
     """
-    world, platform, robot = stands(kind)
+    world, platform, robot = stands("talos")
     before = seen_from(platform, robot)
     go(world, platform, (0.0, 0.0, 0.3), 1.0)
     robot.sleep(0.25)
@@ -81,34 +80,77 @@ def test_it_turns_with_its_ground_and_walks_on_from_there():
     assert robot.state().fallen is None
 
 
-def test_it_makes_a_step_on_ground_that_moves():
-    """Pushed ahead by 15 N s on a platform at 0.1 m/s, as on a floor, it makes a step and stands again."""
-    world, platform, robot = stands()
-    start = np.array(platform.position)
-    world.move(platform, nuno.Path(world.time + np.array([0.0, 6.0]), [start, start + (0.6, 0.0, 0.0)]))
+@pytest.mark.parametrize("newtons", [75.0, 110.0])
+def test_a_push_on_ground_at_a_steady_pace_does_what_it_does_on_ground_at_rest(newtons):
+    """Galileo's principle: pushed ahead for 0.2 s, it makes as many steps, and stands again where it does there."""
+    found = []
+    for speed in (0.0, 0.1):
+        world, platform, robot = stands(size=2.0)
+        start = np.array(platform.position)
+        ends = world.time + np.array([0.0, 10.0])
+        if speed:
+            world.move(platform, nuno.Path(ends, [start, start + 10.0 * speed * np.eye(3)[0]]))
+        robot.sleep(1.5)
+        world.push(robot.links.bodies[0], (newtons, 0.0, 0.0), duration=0.2)
+        steps = 0
+        for _ in range(30):
+            robot.sleep(0.1)
+            step = robot.state().footing.step
+            steps = steps if step is None else max(steps, step.count)
+        found.append((*seen_from(platform, robot), steps))
+        assert robot.state().fallen is None
+    np.testing.assert_allclose(*found, atol=0.02)  # contact and rounding differ: steps land a frame earlier or later
+
+
+def falls(robot):
+    """Let all joints go, and return why the robot has fallen after 1.5 s, and its base's height [m]."""
+    names = robot.actual.joint_names
+    robot.servo(nuno.ServoCommand(names, 0.0, kd=1.0))
     robot.sleep(1.5)
-    world.push(robot.links.bodies[0], (75.0, 0.0, 0.0), duration=0.2)
-    steps = []
-    for _ in range(12):
-        robot.sleep(0.1)
-        steps.append(robot.state().footing.step)
-    assert any(step is not None for step in steps)
-    robot.sleep(2.0)
+    return robot.state().fallen, robot.state().q[2]
+
+
+def test_a_fall_on_a_risen_platform_is_told():
+    """It collapses on a platform of 0.7 m, where it lies higher than half its height above where it stood before."""
+    world, platform, robot = stands(size=2.0)
+    go(world, platform, (0.0, 0.0, 0.5), 1.0)
+    robot.sleep(1.2)
+    why, height = falls(robot)
+    assert why is not None and "above its feet's ground" in why
+    assert height > HEIGHT + 0.5  # [m]: it lies on the platform
+
+
+def test_a_fall_on_a_rigid_lift_is_told():
+    """A body that a grip lifts follows no path, but soles that lay flat on it tell how high it is."""
+    world = nuno.World(device="cpu")
+    world.add(nuno.plane(name="floor"))
+    lift = world.add(nuno.box((2.0, 2.0, HEIGHT), name="lift", position=(0.0, 0.0, 0.5 * HEIGHT)))
+    world.attach(lift, nuno.Rigid(mass=200.0))
+    humanoid = nuno.Humanoid("g1")
+    humanoid.stand((0.0, 0.0, HEIGHT))
+    robot = nuno.SimulatedRobot(humanoid, world, dynamics=True)
+    start = np.array(lift.position)
+    times = world.time + np.array([0.0, 0.4, 3.4])
+    world.grip(lift, to=nuno.Path(times, [start, start, start + 0.5 * np.eye(3)[2]], interpolation="minimum_jerk"))
+    robot.sleep(3.6)
     assert robot.state().fallen is None
-    assert robot.state().footing.step is None
+    assert robot.state().footing.rise == pytest.approx(lift.position[2] - start[2], abs=0.01)
+    why, height = falls(robot)
+    assert why is not None and "above its feet's ground" in why
+    assert height > HEIGHT + 0.5
 
 
 def test_copies_and_a_restored_robot_ride_alike():
     """To the bit; and where a world's platform goes another way, its robot goes with that."""
     world, platform, robot = stands()
-    go(world, platform, (0.1, 0.0, 0.2), 1.0, turn=0.3)
-    robot.sleep(0.5)
-    kept, futures = world.save(), world.imagine(2)
-    others = world.imagine(2)
+    others, there = world.imagine(2), robot.state().q[:3].copy()
     start = np.array(platform.position)
     shifts = np.array([(0.0, 0.2, 0.0), (-0.2, 0.0, 0.1)])
     keys = np.stack([np.tile(start, (2, 1)), start + shifts], axis=1)
-    others.move("platform", nuno.Path(others.time + np.array([0.0, 1.0]), keys, interpolation="minimum_jerk"))
+    others.move("platform", nuno.Path(others.time + np.array([0.0, 2.0]), keys, interpolation="minimum_jerk"))
+    go(world, platform, (0.1, 0.0, 0.2), 1.0, turn=0.3)
+    robot.sleep(0.5)
+    kept, futures = world.save(), world.imagine(2)
     for own in (world, futures):
         own.run(0.8)
     later = robot.state()
@@ -116,14 +158,13 @@ def test_copies_and_a_restored_robot_ride_alike():
         np.testing.assert_array_equal(state.q, later.q)
         np.testing.assert_array_equal(state.v, later.v)
     world.restore(kept)
-    there = robot.state().q[:3].copy()
     world.run(0.8)
     np.testing.assert_array_equal(robot.state().q, later.q)
     np.testing.assert_array_equal(robot.state().v, later.v)
-    others.run(1.6)
+    others.run(2.5)
     for state, shift in zip(others.robot.state(), shifts, strict=True):
         assert state.fallen is None
-        np.testing.assert_allclose(state.q[:3] - there, shift, atol=0.02)  # it swings out of a motion that breaks off
+        np.testing.assert_allclose(state.q[:3] - there, shift, atol=3e-3)
 
 
 def test_a_ride_leads_what_is_wanted_to_where_the_ground_has_gone():

@@ -64,7 +64,9 @@ def _ride_on(
     state: RobotState, world: int, pivot: np.ndarray, feet: Sequence[str], grounds: Mapping[str, Path], end: float
 ) -> Ride | None:
     before, span = earlier_ride(state), end - state.time
-    forces = [(name, max(float(force[2]), 0.0)) for foot in feet for name, force in state.contacts.get(foot, {}).items()]
+    forces = [
+        (name, max(float(force[2]), 0.0)) for foot in feet for name, force in state.contacts.get(foot, {}).items()
+    ]
     total = sum(force for _, force in forces)
     moving = [(grounds[name], force / total) for name, force in forces if name in grounds and force > 0.0]
     if not moving or span <= 0.0:

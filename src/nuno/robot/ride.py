@@ -11,7 +11,7 @@ from nuno.shapes import quaternion as quat
 
 @dataclass(frozen=True, eq=False)
 class Ride:
-    """How far static bodies that follow paths have carried a robot that stands on them, and how they go on.
+    """The way that static bodies on paths have carried a robot that stands on them, and how they go on.
 
     What is wanted of the robot stays where it was commanded; a ride leads from there to where its ground has gone. The
     ground's turn about the upright axis counts, its tilt does not.

@@ -198,26 +198,27 @@ class Stabiliser:
         leans = np.array([self._lean(q[w], wanted[w], ref.places[w], ref.turns[w], loads[w]) for w in known])
         spans = np.array([time - before[w].time for w in known])
         own = found_footings([own for own in was if own is not None], soles, self._weight, spans, leans)
-        # how the centres of mass are to move: places and velocities as seen from the ground, accelerations in the world
-        goals, speeds = ref.centres.copy(), here.centres[:, 1].copy()
+        # velocities as seen from the ground, and accelerations in the world
+        here, ref = (replace(own, centres=own.centres.copy()) for own in (here, ref))
         for w, ride in enumerate(rides):
             if ride is not None and ride.moves:
-                goals[w, 2] += ride.acceleration
-                speeds[w] -= ride.speeds(here.centres[w, 0])
-        stays = self._surely_stay(here, ref, goals, speeds, own, known) if len(self._feet) == 2 else np.ones(len(known), dtype=bool)
+                ref.centres[w, 2] += ride.acceleration
+                here.centres[w, 1] -= ride.speeds(here.centres[w, 0])
+        stays = np.ones(len(known), dtype=bool)
+        if len(self._feet) == 2:
+            stays = self._surely_stay(here, ref, own, known)
         for w, footing, stay in zip(known, own, stays.tolist(), strict=True):
             earlier = was[w]
             found[w] = footing
             if earlier is not None and len(self._feet) == 2 and (earlier.step or loads[w] or not stay):
                 pendulum, _ = self._pendulum(q[w], v[w], loads[w], rides[w])
                 planned = are_planned(ref.places[w : w + 1, :, 2])[0]
-                found[w] = self._stepped(earlier, footing, pendulum, goals[w], planned, pressed[w], time)
+                found[w] = self._stepped(earlier, footing, pendulum, ref.centres[w], planned, pressed[w], time)
         return found
 
     def _surely_stay(
-        self, here: FootKinematics, ref: FootKinematics, goals: np.ndarray, speeds: np.ndarray,
-        footings: Sequence[Footing], known: list[int],
-    ) -> np.ndarray:  # fmt: skip
+        self, here: FootKinematics, ref: FootKinematics, footings: Sequence[Footing], known: list[int]
+    ) -> np.ndarray:
         """Return who is surely in balance on the feet and makes no step, (known,) bool, unless it carries a load.
 
         Discs in the soles, and all that lies between two of them, are in the soles' outline.
@@ -225,8 +226,8 @@ class Stabiliser:
         centres, places, turns = here.centres[known], here.places[known], here.turns[known]
         heights = np.maximum(centres[:, 0, 2] - 0.5 * (places[:, 0, 2] + places[:, 1, 2]), 0.1)
         rates = np.sqrt(self.gravity / heights)[:, None]
-        points = centres[:, 0, :2] + (speeds[known, :2] - goals[known, 1, :2]) / rates
-        points = points - goals[known, 2, :2] / rates**2
+        points = centres[:, 0, :2] + (centres[:, 1, :2] - ref.centres[known, 1, :2]) / rates
+        points = points - ref.centres[known, 2, :2] / rates**2
         bearing = np.array([own.bears for own in footings]) | are_planned(ref.places[known][:, :, 2])
         starts = np.where(bearing[:, :1], places[:, 0, :2], places[:, 1, :2])
         along = np.where(bearing[:, 1:], places[:, 1, :2], places[:, 0, :2]) - starts
