@@ -18,6 +18,7 @@ class FootAims:
         accelerations: (worlds, feet, 6) [m/s2, rad/s2], likewise.
         bears: (worlds, feet) bool, whether they stand on the ground and bear.
         sinks: (worlds, feet) bool, whether they go down until they meet the ground, however far that is.
+        ground: (2, worlds, feet, 6) velocities and accelerations [m/s, rad/s; m/s2, rad/s2] of the ground below them.
     """
 
     places: np.ndarray
@@ -26,6 +27,7 @@ class FootAims:
     accelerations: np.ndarray
     bears: np.ndarray
     sinks: np.ndarray
+    ground: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,6 +15,8 @@ import numpy as np
 from nuno.robot.carried import Carried, carried_by, smoothed
 from nuno.robot.footing import Footing
 from nuno.robot.link_dynamics import LinkDynamics
+from nuno.robot.moving_ground import at_rest, earlier_ride, moving_grounds, rides_on
+from nuno.robot.ride import Ride
 from nuno.robot.robot_state import Contacts, RobotState
 from nuno.robot.stabiliser import Stabiliser
 from nuno.robot.whole_body import Gains, WholeBodyControl
@@ -90,9 +92,10 @@ class Balance:
             if own.fallen is None and not (hangs[w] and own.contacts.keys().isdisjoint(self._foot_links))
         ]  # fmt: skip
         if self.is_on and stabiliser is not None and standing:
-            states = [now[w] for w in standing]
+            states, end = [now[w] for w in standing], now[0].time + span
+            rides = self._rides(states, standing, end)
             motion = stabiliser.actual([own.q for own in states], [own.v for own in states])
-            aims = stabiliser.aims(states, [wanted[w] for w in standing], now[0].time + span)
+            aims = stabiliser.aims(states, _carried([wanted[w] for w in standing], rides), end, rides)
             found, *solved = self._control.solve(states, motion, aims)
             who, (accelerations, efforts) = np.array(standing)[found], (own[found] for own in solved)
             speeds = np.array([own.v[6:] for own in states])[found]
@@ -125,12 +128,15 @@ class Balance:
         footings: list[Footing | None] = [None] * len(before)
         standing = [w for w, why in enumerate(fallen) if why is None and stabiliser is not None]
         if stabiliser is not None and standing:
-            grounds = stabiliser.grounds([wanted[w] for w in standing]).tolist()
-            for w, ground in zip(standing, grounds, strict=True):
-                fallen[w] = self._why_fallen(q[w], wanted[w].q, ground, time)
+            states = [before[w] for w in standing]
+            rides = dict(zip(standing, self._rides(states, standing, time), strict=True))
+            wanted = _carried(wanted, [rides.get(w) for w in range(len(before))])
+            grounds = stabiliser.grounds(states, [wanted[w] for w in standing]).tolist()
+            for w, (ground, planned) in zip(standing, grounds, strict=True):
+                fallen[w] = self._why_fallen(q[w], wanted[w].q[2] - planned, ground, time)
             if self.is_on and time - before[0].time > 0.0:
                 standing = [w for w in standing if fallen[w] is None]
-                own = self._footings(before, wanted, q, v, contacts, time, standing)
+                own = self._footings(before, wanted, q, v, contacts, time, standing, [rides[w] for w in standing])
                 for w, footing in zip(standing, own, strict=True):
                     footings[w] = footing
         full = np.abs(torques) >= FULL * self.dynamics.efforts
@@ -156,12 +162,27 @@ class Balance:
         self._stabiliser.take_gravity(gravity)
         return self._stabiliser
 
-    def _why_fallen(self, q: np.ndarray, wanted: np.ndarray, ground: float, time: float) -> str | None:
-        """Return why and when a robot that is at q (nq,) on a ground [m] fell, None where it did not; say it once."""
+    def _rides(self, states: Sequence[RobotState], worlds: Sequence[int], end: float) -> list[Ride | None]:
+        """Return how far moving ground has carried the robot at the end of a frame [s], in each of some worlds."""
+        stabiliser, grounds = self._stabiliser, moving_grounds(self.dynamics.world)
+        if not grounds or stabiliser is None:
+            return [at_rest(earlier_ride(own)) for own in states]
+        pivots = stabiliser.actual([own.q for own in states], [own.v for own in states]).places.mean(axis=1)
+        return rides_on(states, worlds, pivots, self._foot_links, grounds, end)
+
+    def _why_fallen(self, q: np.ndarray, height: float, ground: float, time: float) -> str | None:
+        """Return why and when a robot fell, None where it did not; say it once.
+
+        Args:
+            q: (nq,) where it is.
+            height: [m], of the wanted base above the wanted soles.
+            ground: [m], the height of what bears it.
+            time: [s].
+        """
         up, why = 1.0 - 2.0 * (q[3] ** 2 + q[4] ** 2), ""
         if up < LEANS:
             why = f"its trunk leans by {np.rad2deg(np.arccos(np.clip(up, -1.0, 1.0))):.0f} degrees"
-        elif q[2] - ground < SINKS * (wanted[2] - ground):
+        elif q[2] - ground < SINKS * height:
             why = f"its base is {q[2] - ground:.2f} m above its feet's ground"
         if not why:
             return None
@@ -173,6 +194,7 @@ class Balance:
     def _footings(
         self, before: Sequence[RobotState], wanted: Sequence[RobotState], q: Sequence[np.ndarray],
         v: Sequence[np.ndarray], contacts: Sequence[Contacts], time: float, standing: list[int],
+        rides: Sequence[Ride | None],
     ) -> list[Footing]:  # fmt: skip
         """Return the footings after a frame in worlds in which a robot stands."""
         stabiliser: Any = self._stabiliser
@@ -185,7 +207,7 @@ class Balance:
         states = [before[w] for w in standing]
         aims, places, speeds = ([part[w] for w in standing] for part in (wanted, q, v))
         loads = [self.load(own) for own in states]
-        footings: list[Footing] = stabiliser.footings(states, aims, places, speeds, pressed, time, loads)
+        footings: list[Footing] = stabiliser.footings(states, aims, places, speeds, pressed, time, loads, rides)
         return footings
 
     def load(self, state: RobotState) -> Carried | None:
@@ -213,3 +235,11 @@ class Balance:
         made._data, made._control = self._robot.model.createData(), self._control.imagined()
         made._stabiliser = None if self._stabiliser is None else self._stabiliser.imagined()
         return made
+
+
+def _carried(wanted: Sequence[RobotState], rides: Sequence[Ride | None]) -> list[RobotState]:
+    """Return how robots are to move where the ground has carried them to."""
+    return [
+        own if ride is None else RobotState.moving(own.time, ride.carried(own.q), own.v, own.a)
+        for own, ride in zip(wanted, rides, strict=True)
+    ]

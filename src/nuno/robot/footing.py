@@ -13,6 +13,7 @@ from nuno.robot.pinocchio import pin
 
 if TYPE_CHECKING:
     from nuno.robot.capture_step import CaptureStep
+    from nuno.robot.ride import Ride
 
 STANDS = 1e-3
 """[m] Above the lowest sole of the wanted posture, up to which a foot is to bear."""
@@ -24,6 +25,8 @@ RESTS = 2e-3
 """[m] By which a foot that bears nothing may have left the ground that it stood on."""
 FORGETS = 0.12
 """[s] In which a foot that was lifted comes back to where it is wanted,"""
+FLAT = 0.1
+"""[rad] By which a sole may be tilted whose height tells that of the ground."""
 ADOPTS = 0.2
 """[s] and in which a tilted sole's tilt is taken for the ground's, and the centre of mass goes along with the feet."""
 
@@ -63,6 +66,8 @@ class Footing:
         centre: (3,) [m], by how much the centre of mass goes along.
         step: The step that catches the robot, or None.
         frames: For how many frames it was out of balance.
+        rise: [m], by how much the ground that soles lay flat on last is higher than where they are wanted.
+        ride: How far moving ground has carried the robot; None where none ever did.
     """
 
     bears: tuple[bool, ...]
@@ -71,6 +76,8 @@ class Footing:
     centre: np.ndarray
     step: CaptureStep | None = None
     frames: int = 0
+    rise: float = 0.0
+    ride: Ride | None = None
 
 
 def are_planned(heights: np.ndarray) -> np.ndarray:
@@ -114,4 +121,10 @@ def found_footings(
     count = bears.sum(axis=1)[:, None]
     middle = np.where(bears[:, :, None], offsets, 0.0).sum(axis=1) / np.maximum(count, 1)
     centres = np.where(count > 0, centres + adopts * (middle + leans - centres), centres)
-    return [Footing(tuple(own), *rest) for own, *rest in zip(bears.tolist(), offsets, tilts, centres, strict=True)]
+    level = presses & (np.abs(tilted[:, :, :2]).max(axis=2) < FLAT)
+    lowest = np.where(level, away[:, :, 2], np.inf).min(axis=1)
+    rises = np.where(level.any(axis=1), lowest, [own.rise for own in before]).tolist()
+    return [
+        Footing(tuple(own), *rest, rise=rise)
+        for own, *rest, rise in zip(bears.tolist(), offsets, tilts, centres, rises, strict=True)
+    ]

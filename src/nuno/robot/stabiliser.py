@@ -15,6 +15,7 @@ from nuno.robot.carried import Carried
 from nuno.robot.foot_kinematics import FeetAndCentre, FootKinematics
 from nuno.robot.footing import FIRM, Footing, Soles, are_planned, found_footings, planned_footings
 from nuno.robot.pinocchio import pin
+from nuno.robot.ride import Ride
 from nuno.robot.robot_state import RobotState
 from nuno.robot.sensors import sole_corners
 from nuno.robot.support import convex_outline
@@ -34,6 +35,8 @@ MIN_SHARE = 0.4
 """Share of the soles' outline that the centre of mass of a robot and its load stays in, standing."""
 LIFTED = 3e-3
 """[m] How far above the other a sole may be that bears nothing, and still stands."""
+UNEVEN = 0.03
+"""[m] By how much ground may be higher or lower than planned, before falls are judged by it: walks land on 2 cm."""
 MAX_STEPS = 8
 """That it makes for one push."""
 SURELY = 0.9
@@ -84,8 +87,17 @@ class Stabiliser:
     def _wanted_of(self, wanted: Sequence[RobotState]) -> FootKinematics:
         return self._wanted.of([own.q for own in wanted], [own.v for own in wanted], [own.a for own in wanted])
 
-    def aims(self, now: Sequence[RobotState], wanted: Sequence[RobotState], time: float) -> Aims:
-        """Return what the whole-body control is to bring about until a time [s], in each world."""
+    def aims(
+        self, now: Sequence[RobotState], wanted: Sequence[RobotState], time: float, rides: Sequence[Ride | None]
+    ) -> Aims:
+        """Return what the whole-body control is to bring about until a time [s], in each world.
+
+        Args:
+            now: How the robots move.
+            wanted: How they are to move, where the ground has carried them to.
+            time: [s].
+            rides: How the ground moves.
+        """
         ref = self._wanted_of(wanted)
         known = [own.footing for own in now]
         if None in known:
@@ -101,17 +113,23 @@ class Stabiliser:
         feet = FootAims(
             ref.places + np.array([own.offsets for own in footings]), turns @ ref.turns, ref.speeds.copy(),
             ref.accelerations.copy(), bears, ~bears & ~(np.abs(ref.speeds).max(axis=2) > MOVES),
+            np.zeros((2, *ref.speeds.shape)),
         )  # fmt: skip
         q, v, a = (np.array(part) for part in zip(*((own.q, own.v, own.a) for own in wanted), strict=True))
         aims = Aims(centres, q, v, a, feet, np.zeros(len(now), dtype=bool))
         for w, footing in enumerate(footings):
             if footing.step is not None:
-                self._aim_at_step(aims, w, now[w], footing.step, time)
+                self._aim_at_step(aims, w, now[w], footing.step, time, rides[w])
+        for w, ride in enumerate(rides):
+            if ride is not None and ride.moves:
+                _let_ride(aims, w, ride, now[w])
         return aims
 
-    def _aim_at_step(self, aims: Aims, w: int, now: RobotState, step: CaptureStep, time: float) -> None:
-        """Change the aims of a world to those of a robot that makes a step to catch itself."""
-        pendulum, centre = self._pendulum(now.q, now.v)
+    def _aim_at_step(
+        self, aims: Aims, w: int, now: RobotState, step: CaptureStep, time: float, ride: Ride | None
+    ) -> None:
+        """Change the aims of a world to those of a robot that makes a step to catch itself, seen from the ground."""
+        pendulum, centre = self._pendulum(now.q, now.v, ride=ride)
         other, feet = 1 - step.foot, aims.feet
         ground = pendulum.feet[other, 2]
         goal = np.zeros((3, 3))
@@ -142,18 +160,29 @@ class Stabiliser:
     def footings(
         self, before: Sequence[RobotState], wanted: Sequence[RobotState], q: Sequence[np.ndarray],
         v: Sequence[np.ndarray], pressed: np.ndarray, time: float, loads: Sequence[Carried | None],
+        rides: Sequence[Ride | None],
     ) -> list[Footing]:  # fmt: skip
         """Return the footings at the end of a frame, with the steps that robots begin or go on with, of each world.
 
         Args:
             before: States when the frame began.
-            wanted: How they were to move.
+            wanted: How they were to move, where the ground has carried them to.
             q: (nq,) where each is.
             v: (nv,) how each moves.
             pressed: (worlds, feet) [N], with what soles press on the ground.
             time: [s].
             loads: What each carries.
+            rides: How the ground moves.
         """
+        found = self._stood(before, wanted, q, v, pressed, time, loads, rides)
+        return [own if ride is None else replace(own, ride=ride) for own, ride in zip(found, rides, strict=True)]
+
+    def _stood(
+        self, before: Sequence[RobotState], wanted: Sequence[RobotState], q: Sequence[np.ndarray],
+        v: Sequence[np.ndarray], pressed: np.ndarray, time: float, loads: Sequence[Carried | None],
+        rides: Sequence[Ride | None],
+    ) -> list[Footing]:  # fmt: skip
+        """Return the footings as ``footings`` does, seen from the ground."""
         ref, here = self._wanted_of(wanted), self.actual(q, v)
         # after a step that is finished, what is wanted begins anew from where the robot stands
         was = [None if own is None or (own.step is not None and own.step.is_finished) else own
@@ -169,12 +198,20 @@ class Stabiliser:
         leans = np.array([self._lean(q[w], wanted[w], ref.places[w], ref.turns[w], loads[w]) for w in known])
         spans = np.array([time - before[w].time for w in known])
         own = found_footings([own for own in was if own is not None], soles, self._weight, spans, leans)
-        stays = self._surely_stay(here, ref, own, known) if len(self._feet) == 2 else np.ones(len(known), dtype=bool)
+        # velocities as seen from the ground, and accelerations in the world
+        here, ref = (replace(own, centres=own.centres.copy()) for own in (here, ref))
+        for w, ride in enumerate(rides):
+            if ride is not None and ride.moves:
+                ref.centres[w, 2] += ride.acceleration
+                here.centres[w, 1] -= ride.speeds(here.centres[w, 0])
+        stays = np.ones(len(known), dtype=bool)
+        if len(self._feet) == 2:
+            stays = self._surely_stay(here, ref, own, known)
         for w, footing, stay in zip(known, own, stays.tolist(), strict=True):
             earlier = was[w]
             found[w] = footing
             if earlier is not None and len(self._feet) == 2 and (earlier.step or loads[w] or not stay):
-                pendulum, _ = self._pendulum(q[w], v[w], loads[w])
+                pendulum, _ = self._pendulum(q[w], v[w], loads[w], rides[w])
                 planned = are_planned(ref.places[w : w + 1, :, 2])[0]
                 found[w] = self._stepped(earlier, footing, pendulum, ref.centres[w], planned, pressed[w], time)
         return found
@@ -239,18 +276,29 @@ class Stabiliser:
             step, frames = found or step, 0
         return replace(footing, step=step, frames=frames)
 
-    def grounds(self, wanted: Sequence[RobotState]) -> np.ndarray:
-        """Return the heights of the lowest soles that are wanted, (worlds,) [m]."""
-        return self._wanted_of(wanted).places[:, :, 2].min(axis=1)
+    def grounds(self, before: Sequence[RobotState], wanted: Sequence[RobotState]) -> np.ndarray:
+        """Return the heights of what bears robots, and of the lowest soles that are wanted, (worlds, 2) [m].
 
-    def _pendulum(self, q: np.ndarray, v: np.ndarray, load: Carried | None = None) -> tuple[Pendulum, np.ndarray]:
-        """Return the robot as a pendulum, and the place of its centre of mass."""
+        Args:
+            before: States when the frame began.
+            wanted: How they were to move, where the ground has carried them to.
+        """
+        lowest = self._wanted_of(wanted).places[:, :, 2].min(axis=1)
+        rises = np.array([0.0 if own.footing is None else own.footing.rise for own in before])
+        return np.stack([lowest + np.where(np.abs(rises) > UNEVEN, rises, 0.0), lowest], axis=1)
+
+    def _pendulum(
+        self, q: np.ndarray, v: np.ndarray, load: Carried | None = None, ride: Ride | None = None
+    ) -> tuple[Pendulum, np.ndarray]:
+        """Return the robot as a pendulum, seen from a ground that moves, and the place of its centre of mass."""
         model, data = self._model, self._data
         pin.centerOfMass(model, data, q, v)
         pin.updateFramePlacements(model, data)
         centre, speed = np.array(data.com[0]), np.array(data.vcom[0])
         if load is not None:
             centre += load.mass / (load.mass + self._mass) * (load.place - centre)
+        if ride is not None and ride.moves:
+            speed -= ride.speeds(centre)
         places = [data.oMf[foot] for foot in self._feet]
         feet = np.array([[*own.translation, np.arctan2(own.rotation[1, 0], own.rotation[0, 0])] for own in places])
         height = max(float(centre[2] - feet[:, 2].mean()), 0.1)
@@ -283,3 +331,15 @@ class Stabiliser:
 
 def _turned(yaw: float) -> np.ndarray:
     return np.asarray(pin.rpy.rpyToMatrix(0.0, 0.0, float(yaw)))
+
+
+def _let_ride(aims: Aims, w: int, ride: Ride, now: RobotState) -> None:
+    """Add the motion of the ground to the aims of a world."""
+    feet = aims.feet
+    feet.ground[:, w] = ride.twists(feet.places[w])
+    feet.speeds[w] += feet.ground[0, w]
+    feet.accelerations[w] += feet.ground[1, w]
+    aims.centres[w, 1] += ride.speeds(aims.centres[w, 0])
+    aims.centres[w, 2] += ride.acceleration
+    upright = pin.Quaternion(now.q[3:7]).toRotationMatrix().T[:, 2]
+    aims.v[w, 3:6] += ride.spin * upright

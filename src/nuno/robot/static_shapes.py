@@ -44,8 +44,7 @@ class Obstacle:
     @property
     def path(self) -> Path | None:
         """The path that it follows, None where it stands."""
-        path: Path | None = self.body._path
-        return path
+        return path_of(self.body)
 
     def poses(self, times: np.ndarray, world: int) -> tuple[np.ndarray, np.ndarray]:
         """Return its places (k, 3) [m] and axes (k, 3, 3) in one world at times (k,) [s]; k is 1 where it stands."""
@@ -57,6 +56,12 @@ class Obstacle:
         own_place = place[world] if place.ndim == (2 if path is None else 3) else place
         own_turn = turn[world] if turn.ndim == (2 if path is None else 3) else turn
         return own_place.reshape(-1, 3), quat.to_matrix(own_turn.reshape(-1, 4))
+
+
+def path_of(body: Body) -> Path | None:
+    """Return the path that a static body follows, None where it stands."""
+    path: Path | None = body._path
+    return path
 
 
 class StaticShapes:

@@ -196,6 +196,8 @@ class WholeBodyControl:
         tilted = np.abs(errors[:, :, 3:5]).max(axis=2, keepdims=True) > LEVEL
         pull = np.where(tilted, errors * (0, 0, 0, 1, 1, 0), 0.0)
         stand = 4.0 * gains.stand_rate * gains.foot_rate * pull - gains.stand_rate * motion.speeds
+        moves = feet.ground.any(axis=(0, 2, 3))
+        stand[moves] += feet.ground[1, moves] + gains.stand_rate * feet.ground[0, moves]
         swing = feet.accelerations + _back(gains.foot_rate, errors, feet.speeds - motion.speeds)
         sinking = -gains.stand_rate * (SINKS + motion.speeds[:, :, 2])
         swing[:, :, 2] = np.where(feet.sinks, sinking, swing[:, :, 2])
