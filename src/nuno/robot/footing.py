@@ -125,6 +125,6 @@ def found_footings(
     lowest = np.where(level, away[:, :, 2], np.inf).min(axis=1)
     rises = np.where(level.any(axis=1), lowest, [own.rise for own in before]).tolist()
     return [
-        Footing(tuple(own), *rest, rise=rise)
-        for own, *rest, rise in zip(bears.tolist(), offsets, tilts, centres, rises, strict=True)
+        Footing(tuple(own), offset, tilt, centre, rise=rise)
+        for own, offset, tilt, centre, rise in zip(bears.tolist(), offsets, tilts, centres, rises, strict=True)
     ]
