@@ -9,6 +9,7 @@ import numpy as np
 from nuno.bodies.body import Body
 from nuno.errors import BodyStateError
 from nuno.joints.grip import Grip, GripSpec
+from nuno.joints.joint import Joint
 from nuno.joints.rows_of_worlds import WorldRows, merge_spec
 from nuno.world.snapshot import Snapshot
 from nuno.world.snapshot_records import BodyRecord, GripRecord
@@ -19,8 +20,8 @@ if TYPE_CHECKING:
 
 def merged_grips(
     world: Simulation, snapshot: Snapshot, records: dict[Body, BodyRecord], at: WorldRows
-) -> tuple[list[tuple[Grip, Any, Any, Any]], list[tuple[GripRecord, Any]]]:
-    """Return what the batch's grips become, (grip, spec, offsets, followed), and grips that come back.
+) -> tuple[list[tuple[Grip, Any, Any, Any, Any]], list[tuple[GripRecord, Any, Any]]]:
+    """Return what the batch's grips become, (grip, spec, offsets, followed, borne), and grips that come back.
 
     Raises:
         BodyStateError: a grip that cannot be there in some worlds and not in others, or holds in another way.
@@ -33,7 +34,8 @@ def merged_grips(
             record = saved.pop(grip.key, None)
             name = grip.body.name
             if record is None:
-                changed.append((grip, merge_spec(grip.spec, None, at, name, None), grip.offsets, grip.followed))
+                spec = merge_spec(grip.spec, None, at, name, None)
+                changed.append((grip, spec, grip.offsets, grip.followed, _borne(grip, None, at)))
                 continue
             target = None if grip.target is None else grip.target.key
             if (grip.body.key, target) != (record.body, record.target) or (grip.offsets is None) != (
@@ -44,10 +46,10 @@ def merged_grips(
             end = None if grip.is_tie else _end_of(origin)
             spec = merge_spec(grip.spec, record.spec, at, name, end)
             offsets = _merged_parts(grip.offsets, record.offsets, at)
-            changed.append((grip, spec, offsets, _followed(grip, record, at)))
+            changed.append((grip, spec, offsets, _followed(grip, record, at), _borne(grip, record, at)))
     for record in saved.values():
         body = by_key[record.body]
-        back.append((record, merge_spec(None, record.spec, at, body.name, None)))
+        back.append((record, merge_spec(None, record.spec, at, body.name, None), _borne(None, record, at)))
         if record.offsets is not None:
             raise BodyStateError(f"the grip on {body.name!r} by another body was released; grip it again in all worlds")
     return changed, back
@@ -90,26 +92,31 @@ def _followed(grip: Grip, record: GripRecord, at: WorldRows) -> Any:
     return at.time - 1.0 if own is None else own[0], *poses
 
 
+def _borne(grip: Grip | None, record: GripRecord | None, at: WorldRows) -> Any:
+    """Return when, and what a grip bore in its last frame, (time, (worlds, 6)); None where nobody knows."""
+    if isinstance(grip, Joint) or (record is not None and record.borne is None):
+        return None
+    mine = np.zeros((at.world_count, 6)) if grip is None else np.atleast_2d(np.concatenate(grip.wrench, axis=-1))
+    return at.time, at.merged(mine, np.zeros((1, 6)) if record is None else record.borne, 1)
+
+
 def set_merged_grips(
-    world: Simulation, changed: list[tuple[Grip, Any, Any, Any]], back: list[tuple[GripRecord, Any]],
+    world: Simulation, changed: list[tuple[Grip, Any, Any, Any, Any]], back: list[tuple[GripRecord, Any, Any]],
     worlds: np.ndarray,
 ) -> None:  # fmt: skip
     """Let grips be what `merged_grips` gave."""
     from nuno.solvers.some_worlds import set_grips
 
     moved_grips: dict[Any, list[Grip]] = {}
-    for grip, spec, offsets, followed in changed:
+    for grip, spec, offsets, followed, borne in changed:
         if not grip.is_tie and (spec is not grip.spec or offsets is not grip.offsets):
             moved_grips.setdefault(grip.body._dynamics, []).append(grip)
-        grip.spec, grip.offsets, grip.followed = spec, offsets, followed
-        if grip.borne is not None:  # what it bore there was in another past
-            grip.borne = grip.borne[0], grip.borne[1].copy()
-            grip.borne[1][worlds] = 0.0
-    for record, spec in back:
+        grip.spec, grip.offsets, grip.followed, grip.borne = spec, offsets, followed, borne
+    for record, spec, borne in back:
         grip = world._grips_by_key.get(record.key) or Grip(world._bodies[record.body], spec)
         grip.key, grip.body = record.key, world._bodies[record.body]
         grip.target = None if record.target is None else world._bodies[record.target]
-        grip.spec, grip.offsets, grip.followed, grip.borne = spec, record.offsets, record.followed, None
+        grip.spec, grip.offsets, grip.followed, grip.borne = spec, record.offsets, record.followed, borne
         world._hold(grip)
     for dynamics in moved_grips:
         if not dynamics.grips_changed:

@@ -246,7 +246,9 @@ class Connection:
         try:
             self._socket.send(encode(message))
         except self._websockets.ConnectionClosed as end:
-            raise ConnectionLostError(f"the connection to {self.url} is lost: {self._reason(end)}") from end
+            lost = ConnectionLostError(f"the connection to {self.url} is lost: {self._reason(end)}")
+            self._lost = self._lost or lost  # also where the thread that receives has not noticed yet
+            raise lost from end
 
     def _connect(self) -> Any:
         from websockets.sync.client import connect
