@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from alike import assert_copies_go_on_alike
 
 import nuno
 
@@ -45,14 +46,4 @@ def test_the_hoist_bears_its_weight_and_its_feet_bear_it_again(lifted):
 def test_copies_hang_alike(lifted):
     """An imagined one, and the robot restored, go on as it does, to the bit, down to the floor."""
     world, robot, _ = lifted
-    kept, futures = world.save(), world.imagine(2)
-    for own in (world, futures):
-        own.run(1.3)
-    later = robot.state()
-    for state in futures.robot.state():
-        np.testing.assert_array_equal(state.q, later.q)
-        np.testing.assert_array_equal(state.v, later.v)
-    world.restore(kept)
-    world.run(1.3)
-    np.testing.assert_array_equal(robot.state().q, later.q)
-    np.testing.assert_array_equal(robot.state().v, later.v)
+    assert_copies_go_on_alike(world, robot, 1.3)

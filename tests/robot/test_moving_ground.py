@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from alike import assert_copies_go_on_alike
 
 import nuno
 from nuno.robot.ride import Ride
@@ -150,17 +151,7 @@ def test_copies_and_a_restored_robot_ride_alike():
     others.move("platform", nuno.Path(others.time + np.array([0.0, 2.0]), keys, interpolation="minimum_jerk"))
     go(world, platform, (0.1, 0.0, 0.2), 1.0, turn=0.3)
     robot.sleep(0.5)
-    kept, futures = world.save(), world.imagine(2)
-    for own in (world, futures):
-        own.run(0.8)
-    later = robot.state()
-    for state in futures.robot.state():
-        np.testing.assert_array_equal(state.q, later.q)
-        np.testing.assert_array_equal(state.v, later.v)
-    world.restore(kept)
-    world.run(0.8)
-    np.testing.assert_array_equal(robot.state().q, later.q)
-    np.testing.assert_array_equal(robot.state().v, later.v)
+    assert_copies_go_on_alike(world, robot, 0.8)
     others.run(2.5)
     for state, shift in zip(others.robot.state(), shifts, strict=True):
         assert state.fallen is None
